@@ -32,7 +32,7 @@ from pneumarm.run import RunTransferSettings
 from pneumarm.simulation import SINGLE_STEPS, FitSettings, StoreFit
 from pneumarm.simulation.enough import collect_enough
 from pneumarm.task import BeginStates, Movement
-from pneumarm.transitions import CollectResult, Store, collect
+from pneumarm.transitions import CollectResult, CollectSettings, Store, collect
 from pneumarm.transitions.watch import Watch
 
 HELD_OUT = ",".join(str(seed) for seed in range(1001, 1011))
@@ -113,7 +113,7 @@ def collected(
     Whole sequences are stored, so there may be one more than needed. Returns the transitions and the minutes.
     """
     return there_and_back.collect_until(
-        path, f"virtual:seed={arm}", seed, Recipe(transitions, minutes, pulses=pulses)
+        path, f"virtual:seed={arm}", seed, Recipe(transitions, minutes, collect=CollectSettings(pulses=pulses))
     )
 
 

@@ -31,7 +31,7 @@ from pneumarm.learning import AnyAgent, LearnSettings, PolicySettings, Training,
 from pneumarm.simulation import SINGLE_STEPS, FitSettings, Simulation, fit_store
 from pneumarm.task import BeginStates, Movement, begin_states
 from pneumarm.task.movements import of_rows
-from pneumarm.transitions import KINDS, Store
+from pneumarm.transitions import KINDS, CollectSettings, Store
 
 TRANSITIONS = 200_000
 SEED_OF_MOVEMENTS = 0
@@ -84,7 +84,8 @@ def prepared(
     db, seed = store_of(folder, arm), seed_of(arm) + recording
     file = db.with_suffix(".sim")
     if not file.exists():
-        there_and_back.collect_until(db, arm, seed, Recipe(minutes=minutes) if minutes else Recipe(TRANSITIONS))
+        recipe = Recipe(0 if minutes else TRANSITIONS, minutes, collect=CollectSettings(pulses=0.0))
+        there_and_back.collect_until(db, arm, seed, recipe)
         with Store.open(db) as store:
             fit_store(store, replace(settings, seed=seed)).simulation.save(file)
     simulation = Simulation.load(file)

@@ -131,7 +131,7 @@ def prepared(plan: Plan, name: str, arm: str, seed: int) -> str:
         if not agent.exists():
             with tempfile.TemporaryDirectory() as place:
                 db = Path(place) / "arm.db"
-                recipe = Recipe(minutes=plan.minutes, pulses=CollectSettings().pulses)
+                recipe = Recipe(minutes=plan.minutes, collect=CollectSettings())
                 there_and_back.collect_until(db, arm, seed, recipe)
                 made, begin = there_and_back.fitted(db, FitSettings(seed=seed))
             made.simulation.save(simulation)

@@ -40,7 +40,7 @@ from pneumarm.experiments.there_and_back import Recipe
 from pneumarm.learning import AnyAgent, PolicySettings, test, train
 from pneumarm.simulation import SINGLE_STEPS
 from pneumarm.task import Movement
-from pneumarm.transitions import Store
+from pneumarm.transitions import CollectSettings, Store
 
 NIGHT = 14 * 3600.0
 """A night's rest [s] (thesis section 5.5.2)."""
@@ -66,7 +66,9 @@ def measure() -> Iterator[str]:
             if missing:
                 with tempfile.TemporaryDirectory() as place:
                     db = Path(place) / "transitions.db"
-                    there_and_back.collect_until(db, name_of(arm), seed, Recipe(transitions))
+                    there_and_back.collect_until(
+                        db, name_of(arm), seed, Recipe(transitions, collect=CollectSettings(pulses=0.0))
+                    )
                     for one in missing:
                         rows.add(trial(db, arm, seed, one, transitions, movements))
                         yield f"arm {arm}, seed {seed}, {one}: measured"

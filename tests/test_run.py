@@ -16,7 +16,7 @@ import pytest
 from children import LIMIT, child, end, python, wait_until
 from pneumarm.errors import UnusableInput
 from pneumarm.run import Run, RunSettings
-from pneumarm.transitions import Store
+from pneumarm.transitions import WHOLE_PERIODS, CollectSettings, Store
 from small import SMALL
 from soak import Attack, amount
 
@@ -236,3 +236,10 @@ def test_movements_are_planned_for_agents_that_reach_or_where_it_is_asked_for() 
     assert RunSettings(task="reach").planned == 40
     assert RunSettings(bound_episodes=3).planned == 3
     assert RunSettings(task="reach", bound_episodes=0).planned == 0
+
+
+def test_the_preset_of_the_thesis_collects_its_way_and_its_sizes_where_nothing_else_is_said():
+    made = RunSettings().of_the_thesis()
+    assert (made.collect, made.transitions, made.transfer.test_episodes) == (WHOLE_PERIODS, 200_000, 500)
+    own = RunSettings(collect=CollectSettings(lean=0.5), transitions=5000).of_the_thesis()
+    assert (own.collect.lean, own.collect.pulses, own.transitions) == (0.5, CollectSettings().pulses, 5000)

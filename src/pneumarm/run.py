@@ -54,7 +54,15 @@ from pneumarm.simulation import FitSettings, Simulation, fit_store
 from pneumarm.simulation.enough import EnoughSettings, collect_enough
 from pneumarm.statistics import FEWEST
 from pneumarm.task import BeginStates, begin_states, read_episodes, write_episodes
-from pneumarm.transitions import FEWEST_TRANSITIONS, KINDS, CollectResult, CollectSettings, Store, collect
+from pneumarm.transitions import (
+    FEWEST_TRANSITIONS,
+    KINDS,
+    WHOLE_PERIODS,
+    CollectResult,
+    CollectSettings,
+    Store,
+    collect,
+)
 
 SETTINGS = "settings.json"
 RECORDED = "recorded.svg"
@@ -105,11 +113,12 @@ class RunSettings(LearnSettings):
     moving: MoveTrialSettings = field(default_factory=MoveTrialSettings)
 
     def of_the_thesis(self) -> Self:
-        """Return the settings with the thesis' sizes in place of those that are left as they are by default."""
+        """Return the settings with the thesis' sizes and its way of collecting in place of those left as they are."""
         usual, thesis, transfer = RunTransferSettings(), TransferSettings(), self.transfer
         if transfer == usual:
             transfer = replace(transfer, episodes=thesis.episodes, test_episodes=thesis.test_episodes)
-        return replace(self, transitions=self.transitions or 200_000, transfer=transfer)
+        collecting = WHOLE_PERIODS if self.collect == CollectSettings() else self.collect
+        return replace(self, transitions=self.transitions or 200_000, collect=collecting, transfer=transfer)
 
     @property
     def settles(self) -> bool:

@@ -38,6 +38,7 @@ def test_every_error_is_revealed_and_named(capsys, tmp_path):
     told = json.loads(capsys.readouterr().out)
     named = {
         ("Leaps in pressure", "sensor at the valve"): "pressure at the valve's side",
+        ("A supply that builds up", "reducer leaks"): "rising supply",
         ("A logarithmic potentiometer", "logarithmic"): "angle logarithmic",
         ("A worn potentiometer", "worn"): "angle worn",
         ("Noise", "noise, single readings"): "noise",
@@ -58,7 +59,7 @@ def test_every_error_is_revealed_and_named(capsys, tmp_path):
     assert lost["claims believed"]["angle"] > 1.5 * lost["driver in order"]["angle"]
     assert lost["claims seen through"]["angle"] < 1.2 * lost["driver in order"]["angle"]
     page = (tmp_path / "errors.html").read_text()
-    assert page.count("data:image/svg+xml") == 10
+    assert page.count("data:image/svg+xml") == 11
     assert "pressure at the valve&#39;s side" in page
 
 

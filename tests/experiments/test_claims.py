@@ -11,13 +11,13 @@ import pytest
 from pneumarm.cli import main
 from pneumarm.errors import UnusableInput
 from pneumarm.experiments.all_goals import EXPERIMENT as ALL_GOALS
-from pneumarm.experiments.claims import conclusions, judge, keys_of, read_all_results, sections
+from pneumarm.experiments.claims import conclusions, judge, keys_of, read_all_results, sections, summary
 from pneumarm.experiments.experiment import Analysis, Claim, Row, TrialRows, sorted_rows
 from pneumarm.experiments.factorial import Factorial
-from pneumarm.experiments.findings import weights_dominate
 from pneumarm.experiments.registry import PLACES, experiment
 from pneumarm.experiments.results import write_page
 from pneumarm.experiments.switch_punishment import EXPERIMENT as PUNISHMENT
+from pneumarm.experiments.verdict import OPEN
 
 OF_THE_THESIS = {
     *("control-frequency", "state-history", "enough-data", "noise-for-transfer", "switch-punishment", "all-goals"),
@@ -29,7 +29,8 @@ OF_THE_THESIS = {
 
 def results(folder: Path, name: str, claims: list[tuple[str, str]], arms: int = 5, runs: int = 4) -> None:
     """Write the results of an experiment whose claims are about and have the verdict given."""
-    found = [{"claim": a, "thesis": "1", "ours": "2", "verdict": v, "about": a} for a, v in claims]
+    rest = {"thesis": "1", "ours": "2", "stated": "holds above 0", "medians": "3", "why": "", "p": 0.0001}
+    found = [{"claim": a, "verdict": v, "about": a, "arms": 9 * (v == OPEN), **rest} for a, v in claims]
     (folder / name).mkdir(parents=True)
     about = {"experiment": name, "arms": [f"arm {n}" for n in range(arms)], "runs": runs, "claims": found, "rows": 3}
     (folder / name / "results.json").write_text(json.dumps(about))
@@ -55,19 +56,57 @@ def test_claims_are_about_all_conclusions_that_name_their_experiment(name: str) 
 
 def test_verdicts_add_up(tmp_path: Path) -> None:
     verdicts = [("sarsa", "holds"), ("sarsa", "holds"), ("neurons", "holds"), ("neurons", "does not hold")]
-    verdicts += [("gamma", "does not hold"), ("gamma", "open"), ("traces", "open"), ("traces", "holds")]
+    verdicts += [("gamma", "does not hold"), ("gamma", OPEN), ("traces", OPEN), ("traces", "holds")]
     results(tmp_path, "all-goals", verdicts)
-    results(tmp_path, "no-shaping", [("shaping-not-indispensable", "open")])
+    results(tmp_path, "no-shaping", [("shaping-not-indispensable", OPEN)])
     found = judged(tmp_path)
-    expected = {"sarsa": "holds", "neurons": "in part", "gamma": "does not hold", "traces": "open"}
+    expected = {"sarsa": "holds", "neurons": "in part", "gamma": OPEN, "traces": "in part"}
     assert {key: found[key].verdict for key in expected} == expected
-    assert found["learning-rate"].verdict == "open"  # all-goals was run and said nothing of it
+    assert found["learning-rate"].verdict == OPEN  # all-goals was run and said nothing of it
     assert found["q-fluctuates"].verdict == "not run"
     both = found["shaping-not-indispensable"]
     assert len(both.claims) == 1
     assert both.missing == ("shaping-settings",)
     assert found["sarsa"].explained() == "Verdict: holds."
     assert found["neurons"].explained() == "Verdict: in part. Holds: neurons. Does not hold: neurons."
+
+
+def test_what_no_experiment_decides_says_what_would(tmp_path: Path) -> None:
+    results(tmp_path, "all-goals", [("sarsa", "holds")])
+    made = judge(read_all_results(tmp_path))
+    lacking = [each for each in made if not each.conclusion.experiments]
+    assert len(lacking) >= 7
+    titles = {section.title: section.text[0] for section in sections(made, tmp_path)}
+    for each in lacking:
+        assert each.verdict == OPEN
+        assert titles[each.conclusion.says] == f"Verdict: {OPEN}. What would decide it: {each.conclusion.lacks}."
+
+
+def test_the_page_of_one_arm_speaks_of_it_alone(tmp_path: Path) -> None:
+    results(tmp_path, "all-goals", [("sarsa", OPEN)], arms=1)
+    made = judge(read_all_results(tmp_path))
+    assert "What rests on one arm speaks of that arm alone: arm 0." in summary(made)
+    (tmp_path / "one" / "all-goals").mkdir(parents=True)
+    table = rows(ALL_GOALS, wobble, arms=1)
+    found = claims(ALL_GOALS, table)
+    assert {claim.verdict for claim in found} == {OPEN}
+    page = write_page(
+        ALL_GOALS, tmp_path / "one" / "all-goals", Analysis([], {}, [], found), 4, table.arms
+    ).read_text()
+    assert "All of it is true of arm 0 alone" in page
+    assert "one arm, of which alone this speaks" in page
+    assert f"{len(found)} claims: {len(found)} undecided by this design" in page
+    for claim in found:
+        assert claim.criterion.stated() in page
+
+
+def test_all_that_is_judged_at_once_is_told(tmp_path: Path) -> None:
+    results(tmp_path, "all-goals", [("sarsa", "holds"), ("gamma", "does not hold"), ("traces", OPEN)])
+    made = judge(read_all_results(tmp_path))
+    rules = " ".join(sections(made, tmp_path)[0].text)
+    assert "3 claims are judged one by one" in rules
+    assert "Of the 2 that hold or are refuted 2 also stand" in rules
+    assert "1 held up" in summary(made)[0]
 
 
 def test_a_claim_about_nothing_listed_is_not_lost(tmp_path: Path) -> None:
@@ -79,13 +118,13 @@ def test_a_claim_about_nothing_listed_is_not_lost(tmp_path: Path) -> None:
 
 def test_what_is_missing_has_its_command(tmp_path: Path) -> None:
     results(tmp_path, "all-goals", [("sarsa", "holds")], arms=1, runs=8)
-    results(tmp_path, "long-training", [("q-fluctuates", "open")], arms=5, runs=4)
+    results(tmp_path, "long-training", [("q-fluctuates", OPEN)], arms=5, runs=4)
     made = sections(judge(read_all_results(tmp_path)), tmp_path)
     commands = {row[0]: row[-1] for row in made[-1].tables[0].rows}
     assert commands["no-shaping"] == f"pneumarm experiment no-shaping --out {tmp_path}"
-    assert "--runs 4" in commands["all-goals"]
-    assert "virtual:seed=5" in commands["all-goals"]
-    assert set(commands) == OF_THE_THESIS - {"long-training"}
+    nine = f"pneumarm experiment long-training --out {tmp_path} --arms $(seq -f virtual:seed=%g -s , 1 9)"
+    assert commands["long-training"] == nine
+    assert set(commands) == OF_THE_THESIS - {"all-goals"}
 
 
 def test_the_command_writes_the_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -101,7 +140,7 @@ def test_the_command_writes_the_page(tmp_path: Path, capsys: pytest.CaptureFixtu
 
 def test_the_table_for_a_note(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """All conclusions, each followed by its claims, thesis beside ours; the terminal shows the same."""
-    results(tmp_path, "all-goals", [("sarsa", "holds"), ("gamma", "open"), ("sarsa", "does not hold")])
+    results(tmp_path, "all-goals", [("sarsa", "holds"), ("gamma", OPEN), ("sarsa", "does not hold")])
     with pytest.raises(SystemExit) as ended:
         main(["claims", "--out", str(tmp_path), "--markdown"])
     assert ended.value.code == 0
@@ -152,18 +191,17 @@ def claims(made: Factorial, table: TrialRows) -> list[Claim]:
 def test_weights_dominate_where_runs_decide_and_not_where_a_column_does() -> None:
     draw = np.random.default_rng(0)
     column = ALL_GOALS.design.array.column(4)
-    _, theirs = ALL_GOALS.analyses(rows(ALL_GOALS, wobble, arms=1))
 
     def said(weights: float, effect: float) -> Claim:
         luck = {(arm, run): weights * draw.normal() for arm in range(3) for run in range(1, 5)}
         table = rows(ALL_GOALS, lambda a, t, r: 50 * a + luck[a, r] + effect * column[t - 1] + draw.normal())
-        return weights_dominate(ALL_GOALS, table, {}, theirs)
+        return next(claim for claim in claims(ALL_GOALS, table) if claim.about == "weights-alike")
 
     assert said(weights=10, effect=1).verdict == "holds"
     refuted = said(weights=2, effect=20)
     assert refuted.verdict == "does not hold"
     assert "the largest column (4)" in refuted.ours
-    assert [said(weights=0, effect=0).verdict for _ in range(20)].count("open") == 20  # whichever column is largest
+    assert [said(weights=0, effect=0).verdict for _ in range(20)].count(OPEN) == 20  # whichever column is largest
 
 
 def test_the_share_of_variance_within_settings() -> None:
@@ -188,7 +226,7 @@ def test_arms_are_the_sample() -> None:
         assert found.samples == 3
         assert (found.low > 0) == sure
         (traces,) = (c for c in claims(ALL_GOALS, table) if "marginal" in c.text)
-        assert traces.verdict == ("does not hold" if sure else "open")
+        assert traces.verdict == ("does not hold" if sure else OPEN)
 
 
 def wobble(arm: int, trial: int, run: int) -> float:

@@ -10,7 +10,7 @@ from hypothesis.extra.numpy import arrays
 from scipy.stats import spearmanr
 
 from pneumarm.experiments.analysis import filled_words, number, shown_trials
-from pneumarm.experiments.differences import Interval, interval, within_margin
+from pneumarm.experiments.claims import conclusions
 from pneumarm.experiments.experiment import Axis, Row, TrialRows, sorted_rows
 from pneumarm.experiments.factorial import rank_correlation
 from pneumarm.experiments.means import (
@@ -29,6 +29,7 @@ from pneumarm.experiments.means import (
 from pneumarm.experiments.overnight.analysis import answer
 from pneumarm.experiments.pictures import Curve, against, courses, dots
 from pneumarm.experiments.registry import PLACES, experiment
+from pneumarm.experiments.verdict import Criterion, Interval, interval
 from pneumarm.experiments.words import ClaimWords, Column, Quantity, Words
 
 TRIALS = {1: "one", 2: "the second of them"}
@@ -65,7 +66,7 @@ def test_what_is_missing_in_a_row_does_not_count() -> None:
         return Row(arm, 1, run, figures, 0.0)
 
     two = TrialRows((row("a", 1, x=1.0), row("a", 2, x=3.0), row("b", 1, x=8.0), row("b", 2)))
-    assert mean(two, "x", 1)[::2] == (5.0, 2)
+    assert mean(two, "x", 1)[:3:2] == (5.0, 2)
     assert f"{mean(two, 'x', 1).times(-1):.0f}" == "−5\u00a0±\u00a038"  # half is t(0.975, 1) 12.7 times 3
     one = TrialRows((row("a", 1, x=1.0), row("a", 2, x=3.0)))
     assert f"{mean(one, 'y', 1):.2f}" == "none"
@@ -75,7 +76,7 @@ def test_what_is_missing_in_a_row_does_not_count() -> None:
 @given(TABLES)
 def test_an_arm_of_which_nothing_is_known_is_none(values: np.ndarray) -> None:
     """Nor is a run, where its arm has others: what is left has the mean and interval that it had alone."""
-    assert over_arms(values) == pytest.approx(interval(values.mean(axis=1)), nan_ok=True)
+    assert over_arms(values)[:3] == pytest.approx(interval(values.mean(axis=1))[:3], nan_ok=True)
     unknown = np.full((1, values.shape[1]), math.nan)
     assert over_arms(np.vstack([values, unknown])) == over_arms(values)
     assert over_arms(np.hstack([values, unknown[:, :1].repeat(len(values), 0)])) == over_arms(values)
@@ -100,12 +101,6 @@ def test_values_and_differences_in_words() -> None:
     assert f"{found}" == str(found) == "+1.25\u00a0±\u00a00.50"
 
 
-def test_within_a_margin() -> None:
-    assert within_margin(Interval(0.5, 0.4, 5), 1.0) == "holds"
-    assert within_margin(Interval(0.5, 0.6, 5), 1.0) == "open"
-    assert within_margin(Interval(-3.0, 1.0, 5), 1.0) == "does not hold"
-
-
 def test_a_table_says_what_programs_are_told() -> None:
     percent = Column(figure="x", words="x [%]", digits=1, factor=100.0, thesis={TRIALS[2]: 0.5})
     columns = [percent, Column(figure="x", words="x")]
@@ -118,19 +113,18 @@ def test_a_table_says_what_programs_are_told() -> None:
         assert line[0].replace("\N{NO-BREAK SPACE}", " ") == words
 
 
-def test_words_are_filled_with_what_was_found_and_claims_judged_by_it() -> None:
-    found = {"sure": Interval(5.0, 1.0, 5), "vague": Interval(0.0, 9.0, 5), "verdict": "open", "unknown": None}
-    rules = {
-        "sure > 0": "holds", "sure < 0": "does not hold", "sure > 5.5": "open", "|sure| < 7": "holds",
-        "|vague| < 1": "open", "sure > 0 and vague < 0": "open", "verdict": "open", "unknown > 0": None,
-    }  # fmt: skip
-    claims = tuple(ClaimWords("it", "says {sure:.1f}", "yes", "{vague:.0f}", rule) for rule in rules)
-    words = Words("title", "question", "source", ("{sure:+.2f}",), claims=claims).filled(found)
+def test_words_are_filled_with_what_was_found_and_claims_left_out_that_lack_it() -> None:
+    found = {"sure": Interval(5.0, 1.0, 5), "vague": Interval(0.0, 9.0, 5), "unknown": None}
+    stated = [
+        Criterion(figure=names, above=0.0, matters=1.0) for names in ("sure", ("sure", "vague"), ("sure", "unknown"))
+    ]
+    claims = tuple(ClaimWords("says {sure:.1f}", "yes", "{vague:.0f}", one) for one in stated)
+    words = Words("title", "question", "source", ("{sure:+.2f}",), claims={"key": claims}).filled(found)
     assert words.summary == ("+5.00\u00a0±\u00a01.00",)
-    assert [claim.verdict(found) for claim in words.claims] == [verdict for verdict in rules.values() if verdict]
-    assert {(claim.claim, claim.ours) for claim in words.claims} == {("says 5.0\u00a0±\u00a01.0", "0\u00a0±\u00a09")}
-    with pytest.raises(ValueError, match="expected a rule"):
-        ClaimWords("it", "says", "yes", "no", "sure <> 0").verdict(found)
+    assert [claim.stated for claim in words.claims["key"]] == stated[:2]
+    assert {(claim.claim, claim.ours) for claim in words.claims["key"]} == {
+        ("says 5.0\u00a0±\u00a01.0", "0\u00a0±\u00a09")
+    }
 
 
 def test_pictures_say_in_words_what_they_draw() -> None:
@@ -169,8 +163,13 @@ def test_the_answer_about_the_night() -> None:
 def test_words_name_trials_and_columns_that_there_are(name: str) -> None:
     made = experiment(name)
     for one in made.words.estimates.values():
-        assert number(made, one.trial) in made.trials
+        assert one.trial is None or number(made, one.trial) in made.trials
         assert one.base is None or number(made, one.base) in made.trials
+    for about, claims in made.words.claims.items():
+        assert about in {each.key for each in conclusions()}
+        for claim in claims:
+            assert claim.stated.matters > 0
+            assert (claim.stated.above, claim.stated.below) != (None, None)
     for section in made.words.sections:
         assert shown_trials(made, section)
         assert len(section.drawn) == len(section.dots)

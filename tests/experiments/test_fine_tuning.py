@@ -1,5 +1,7 @@
 """Fine tuning: three levels, chosen by odd runs and confirmed by even ones."""
 
+from typing import Any
+
 import numpy as np
 
 from pneumarm.experiments.claims import keys_of
@@ -7,6 +9,7 @@ from pneumarm.experiments.experiment import Row, TrialRows, sorted_rows
 from pneumarm.experiments.fine_tuning import EXPERIMENT
 from pneumarm.experiments.fine_tuning.analysis import confirmation, returns_figure
 from pneumarm.experiments.registry import experiment
+from pneumarm.experiments.verdict import OPEN
 from pneumarm.learning import TrainSettings
 
 LAST = EXPERIMENT.reference
@@ -44,11 +47,15 @@ def test_what_was_chosen_is_confirmed_by_other_runs() -> None:
             "once": ({4: 9.0}, {}),
         }.items()
     }
-    assert said["better"]["verdict"] == "holds"
+    assert verdict(said["better"]) == "holds"
     assert said["better"]["ours"].startswith(("+9.", "+8.9"))
-    assert said["lucky"]["verdict"] == "does not hold"
+    assert verdict(said["lucky"]) == "does not hold"
     assert abs(float(said["other"]["ours"].split()[0])) < 0.5
-    assert confirmation(EXPERIMENT, rows({4: 9.0}, {}, runs=1))["verdict"] == "open"
+    assert verdict(confirmation(EXPERIMENT, rows({4: 9.0}, {}, runs=1))) == OPEN
+
+
+def verdict(found: dict[str, Any]) -> str:
+    return EXPERIMENT.words.claims["fine-tuning"][0].stated.judge(found).verdict
 
 
 def test_the_page_has_the_array_and_trial_10() -> None:

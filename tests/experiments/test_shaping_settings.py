@@ -15,6 +15,7 @@ from pneumarm.experiments.preparation import PLAN, Simulated, simulated
 from pneumarm.experiments.shaping_settings import EXPERIMENT
 from pneumarm.experiments.shaping_settings.analysis import strategy_figure
 from pneumarm.experiments.shaping_settings.shapings import WholeAndWorn
+from pneumarm.experiments.verdict import OPEN
 from pneumarm.learning import Shaping, TrainSettings
 
 SHORT = LaboratorySettings(test_episodes=100, max_episodes=1000)
@@ -72,7 +73,7 @@ def rows(met: dict[int, float], arms: int = 5, runs: int = 4) -> TrialRows:
                 noise = draw.normal() * (1 if shaped else 4)
                 figures = dict.fromkeys(("success_rate", "learning success_rate", "actions", "switches"), 1.0)
                 figures["reward"] = base + 10 * shaped + noise
-                figures["episodes"] = 9000.0 + 500 * shaped + noise
+                figures["episodes"] = 9000.0 + 2000 * shaped + noise
                 figures["met"] = met.get(trial, 1.0)
                 found.append(Row(f"arm {arm}", trial, run, figures, 0.0))
     return sorted_rows(found)
@@ -92,21 +93,21 @@ def test_verdicts_follow_from_the_rows() -> None:
     assert said["Shaping is not indispensable"] == "holds"
     assert said["Without shaping fewer episodes are needed"] == "holds"
     assert said["With a worn potentiometer shaping is indispensable"] == "holds"
-    assert said["Adjusting the deviation more often than every 500 episodes saves episodes"] == "open"
+    assert said["Adjusting the deviation more often than every 500 episodes saves episodes"] == "does not hold"
     said = verdicts(rows({WITHOUT: 0.0}))
     assert said["Shaping is not indispensable"] == "does not hold"
     assert said["With a worn potentiometer shaping is indispensable"] == "does not hold"
 
 
 def test_one_run_decides_nothing() -> None:
-    assert set(verdicts(rows({}, arms=1, runs=1)).values()) == {"open"}
+    assert set(verdicts(rows({}, arms=1, runs=1)).values()) == {OPEN}
 
 
 def test_the_spread_is_that_within_arms() -> None:
     """Arms differ by hundreds here; runs by 30, alike with and without shaping."""
     claims = EXPERIMENT.analyse(rows({})).claims
     (spread,) = (claim for claim in claims if "standard deviation" in claim.text)
-    first, second = (float(value) for value in spread.ours.split(" against "))
+    first, second = (float(value) for value in spread.ours.split(";")[0].split(" against "))
     assert 10 < first < 60
     assert 10 < second < 60
 

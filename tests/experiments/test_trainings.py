@@ -181,6 +181,7 @@ def test_the_command_leaves_a_page_and_goes_on(tmp_path: Path, capsys: pytest.Ca
     """Two experiments in one laboratory: the arm is prepared once, rows are computed once."""
     laboratory = tmp_path / "laboratory"
     options = ["--out", laboratory, "--transitions", 6000, "--test-episodes", 20, "--max-episodes", 20, "--json"]
+    options += ["--arms", "virtual"]
     for name, runs, computed in (("optimal-settings", 2, 4), ("optimal-settings", 3, 2), ("all-goals", 2, 32)):
         with pytest.raises(SystemExit) as ended:
             main(["experiment", name, "--runs", str(runs), *map(str, options)])

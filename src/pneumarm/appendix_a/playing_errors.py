@@ -16,6 +16,7 @@ from pneumarm.arm.serial import BoardLine, EmulatedBoard, FaultyLine, LineFaults
 from pneumarm.arm.virtual import (
     Fault,
     LogarithmicPotentiometer,
+    ReducerLeak,
     SensorNoise,
     ValveSideSensor,
     VirtualArm,
@@ -85,7 +86,7 @@ def _cases(
     seed: int, settings: RunsSettings, progress: Callable[[float, float], None]
 ) -> dict[str, tuple[Case, ...]]:
     """Run the arm without the errors and with each."""
-    made, total = 0, 9
+    made, total = 0, 10
     progress(made, total)
 
     def case(name: str, arm: Arm, before: Case | None = None, *, checked: bool = True) -> Case:
@@ -100,6 +101,7 @@ def _cases(
     worn, loud = WornPotentiometer(angle=5.0, height=15.0, contact=8.0), SensorNoise(angle=6.0, pressure=6.0)
     found = {
         "valve side": (healthy, case("sensor at the valve", virtual(seed, ValveSideSensor(muscle=1)), healthy)),
+        "reducer": (healthy, case("reducer leaks", virtual(seed, ReducerLeak(rate=0.02)), healthy)),
         "logarithmic": (healthy, case("logarithmic", virtual(seed, LogarithmicPotentiometer()), healthy)),
         "worn": (healthy, case("worn", virtual(seed, worn), healthy)),
         "noise": (

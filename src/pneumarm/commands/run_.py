@@ -42,7 +42,8 @@ def run_(
     preset
         Sizes: minutes of the arm's time, or the thesis', hours.
 
-        The thesis' sizes are taken for what no other option says.
+        The thesis' sizes, and its way of collecting (valves open for whole periods), are taken for what no other
+        option says.
     write_config
         Write all options into this TOML file, and do no more.
 

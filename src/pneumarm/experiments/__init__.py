@@ -11,9 +11,9 @@ All experiments of a laboratory share a folder:
 
 To add an experiment, make a folder (a package) here; :mod:`.registry` finds it by its ``EXPERIMENT``. It holds
 
-- ``__init__.py``: the question, the factors, the command and the answer in two sentences, and ``EXPERIMENT``;
+- ``__init__.py``: the question, the factors and the command, and ``EXPERIMENT``;
 - ``words.toml``: what is estimated from the rows, the tables and pictures of the page, and the claims of the thesis
-  with the rule each is judged by (:mod:`.words`); :mod:`.analysis` makes the page of it;
+  with what each states beforehand (:mod:`.words`); :mod:`.analysis` makes the page of it;
 - where what is varied is more than data, a module named for it: the trials, ``settings`` (JSON that decides the
   rows), ``prepare`` (what is needed of an arm; :func:`~.preparation.simulated` collects and fits) and ``measure`` (a
   row: pure, seeded by :func:`~.experiment.run_seed`, so that all trials of a run begin alike);

@@ -9,10 +9,10 @@ from typing import Any
 
 import msgspec
 
-from pneumarm.experiments.differences import Interval
-from pneumarm.experiments.experiment import Analysis, Claim, Experiment, TrialRows
+from pneumarm.experiments.experiment import Analysis, Experiment, TrialRows, claims_of
 from pneumarm.experiments.means import estimate, means_table, numbers
 from pneumarm.experiments.pictures import against, dots
+from pneumarm.experiments.verdict import Interval
 from pneumarm.experiments.words import Quantity, SectionWords, Words
 from pneumarm.report.page import Picture, Section, Table
 
@@ -35,7 +35,9 @@ def filled_words(experiment: Experiment, rows: TrialRows, **own: Any) -> tuple[W
     words = experiment.words
     found: dict[str, Any] = {name: by_trial(experiment, rows, what) for name, what in words.results.items()}
     found |= {
-        name: estimate(rows, one, number(experiment, one.trial), number(experiment, one.base))
+        name: by_trial(experiment, rows, one)
+        if one.trial is None
+        else estimate(rows, one, number(experiment, one.trial), number(experiment, one.base))
         for name, one in words.estimates.items()
     }
     return words.filled(found | own), found | own
@@ -77,7 +79,7 @@ def analysed(
 
     """
     if figures is None:
-        named = {name: {t: one._asdict() for t, one in found[name].items()} for name in words.results}
+        named = {name: {t: one.figures() for t, one in found[name].items()} for name in words.results}
         figures = named or _columns(experiment, rows, words)
     sections = []
     for place, section in enumerate(words.sections):
@@ -87,8 +89,7 @@ def analysed(
         )
         drawn = (pictures or {}).get(place) or _drawn(experiment, rows, section, trials)
         sections.append(Section(section.title, section.text, drawn, [*made, *(tables or {}).get(place, ())]))
-    claims = [Claim(c.claim, c.thesis, c.ours, c.verdict(found), c.about) for c in words.claims]
-    return Analysis([words.question, *words.summary], figures, sections, claims)
+    return Analysis([words.question, *words.summary], figures, sections, claims_of(words, found))
 
 
 def shown_trials(experiment: Experiment, section: SectionWords, *, called: bool = True) -> dict[int, str]:

@@ -5,15 +5,16 @@ import importlib.util
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.errors import UnusableInput
-from pneumarm.experiments.differences import Verdict
+from pneumarm.experiments.verdict import Criterion, Interval, Judgement, Verdict
 from pneumarm.experiments.words import Words
 from pneumarm.progress import Report
 from pneumarm.settings import NonNegativeInt, PositiveInt, Settings
@@ -39,6 +40,8 @@ class LaboratorySettings(Settings):
     """Greedy movements that every agent is tested with (thesis section 5.2)."""
     max_episodes: PositiveInt | None = None
     """Training episodes at most; otherwise as many as the experiment says."""
+    collecting: Literal["thesis", "ours"] = "thesis"
+    """How arms are recorded: as in the thesis, or with lean sequences and begin states by this arm's own times."""
     exploring: bool = False
     """Test every agent a second time, exploring as when its training ended; that takes as long as training it."""
 
@@ -67,7 +70,12 @@ class TrialRows:
 
     rows: tuple[Row, ...]
 
-    @property
+    @cached_property
+    def by_key(self) -> Mapping[tuple[str, int, int], Row]:
+        """Rows by what identifies them."""
+        return {row.key: row for row in self.rows}
+
+    @cached_property
     def arms(self) -> tuple[str, ...]:
         """Arms in the order of their names."""
         return tuple(sorted({row.arm for row in self.rows}))
@@ -82,7 +90,7 @@ class TrialRows:
         wanted = set(trials)
         return TrialRows(tuple(row for row in self.rows if row.trial in wanted))
 
-    @property
+    @cached_property
     def runs(self) -> int:
         """Highest number of a run."""
         return max((row.run for row in self.rows), default=0)
@@ -95,20 +103,16 @@ class TrialRows:
 
         """
         arms = self.arms if arm is None else (arm,)
-        found = {row.key: row.figures[figure] for row in self.rows}
+        found = self.by_key
         keys = [[(a, t, r) for a in arms for r in range(1, self.runs + 1)] for t in trials]
         missing = [key for line in keys for key in line if key not in found]
         if missing:
             raise UnusableInput(f"{len(missing)} rows are missing, the first is {missing[0]}; finish the sweep first")
-        return np.array([[found[key] for key in line] for line in keys])
+        return np.array([[found[key].figures[figure] for key in line] for line in keys])
 
-    def samples(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the independent samples in ``values`` (arms times runs,), a line of a table.
-
-        Runs on one arm share its simulation: where there are several arms they are their means, shape (arms,).
-        """
-        arms = len(self.arms)
-        return values if arms == 1 else values.reshape(arms, -1).mean(axis=1)
+    def pooled(self, figure: str, trials: Sequence[int]) -> NDArray[np.float64]:
+        """Return ``figure`` of all ``trials``, those of each arm side by side, shape (arms, trials times runs)."""
+        return np.stack([self.table(figure, trials, arm).ravel() for arm in self.arms])
 
 
 @dataclass(frozen=True)
@@ -120,9 +124,34 @@ class Claim:
     """The thesis' evidence."""
     ours: str
     """Ours, with an interval where there is one."""
-    verdict: Verdict
     about: str
     """Which of the thesis' conclusions it is about, by its key in ``claims/conclusions.toml``."""
+    criterion: Criterion
+    """What was stated of it beforehand."""
+    found: Mapping[str, Any]
+    """What it is judged by."""
+
+    @cached_property
+    def judgement(self) -> Judgement:
+        """What its criterion makes of what was found."""
+        return self.criterion.judge(self.found)
+
+    @property
+    def verdict(self) -> Verdict:
+        """Whether it holds."""
+        return self.judgement.verdict
+
+    @property
+    def medians(self) -> str:
+        """What the medians of the runs say in place of their means, for people."""
+        found = [self.found[name] for name in self.criterion.names]
+        return "; ".join(str(one.median) for one in found if isinstance(one, Interval) and one.median)
+
+
+def claims_of(words: Words, found: Mapping[str, Any]) -> tuple[Claim, ...]:
+    """Return the claims of ``words`` that are filled with what was ``found``."""
+    named = ((about, one) for about, claims in words.claims.items() for one in claims)
+    return tuple(Claim(one.claim, one.thesis, one.ours, about, one.stated, found) for about, one in named)
 
 
 @dataclass(frozen=True)

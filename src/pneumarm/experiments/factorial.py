@@ -4,7 +4,7 @@ The same class does all of them; what they are is data, in the folder of each.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 from pneumarm.experiments.comparison import side_by_side
 from pneumarm.experiments.design.analysis import Goal, TableAnalysis, analyse_table
 from pneumarm.experiments.design.assignment import Design, Factor
-from pneumarm.experiments.design.effects import effects
 from pneumarm.experiments.design.loss import loss
-from pneumarm.experiments.differences import Interval, above, below, interval
-from pneumarm.experiments.experiment import Analysis, Claim, Figures, LaboratorySettings, TrialRows
+from pneumarm.experiments.experiment import ARMS, Analysis, Claim, Figures, LaboratorySettings, TrialRows, claims_of
+from pneumarm.experiments.means import at_limit, over_arms
 from pneumarm.experiments.preparation import Simulated
 from pneumarm.experiments.trainings import CRITERIA, EXPLORING, LEARNING, Trainings, train_and_test, with_settings
+from pneumarm.experiments.verdict import Criterion, Interval, interval
 from pneumarm.experiments.words import Words
 from pneumarm.learning import TrainSettings
 
@@ -34,10 +34,12 @@ def _goal(criterion: str) -> Goal:
 _IN_WORDS = {**CRITERIA, "gain": "change of the reward by training on"}
 Analyses = Mapping[str, TableAnalysis]
 """Analyses by criterion."""
-Finding = Callable[["Factorial", TrialRows, Analyses, Analyses], Claim]
-"""Makes a claim of the rows, their analyses and the thesis'."""
+Finding = Callable[["Factorial", TrialRows, Analyses, Analyses], dict[str, Any]]
+"""Returns what claims are judged by, from the rows, their analyses and the thesis'."""
 
 
+MATTERS = {"reward": 2.0, "gain": 2.0, "actions": 1.0, "switches": 0.5, "episodes": 1000.0}
+"""Sizes that matter, of effects and differences: of the reward two actions, a quarter of what a switch costs."""
 Spread = Literal["mean", "std"]
 """The losses that the thesis ranks by."""
 
@@ -53,6 +55,8 @@ class EffectClaim(NamedTuple):
     """See :attr:`~.experiment.Claim.about`."""
     loss: Spread = "mean"
     """Loss that the effect is on; ``std`` for the spread of the runs."""
+    slight: float | None = None
+    """Size that it does not reach, where the thesis calls it slight."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,7 +66,7 @@ class Factorial(Trainings):
     name: str
     words: Words
     runs: int
-    arms = ("virtual",)
+    arms = ARMS
     design: Design
     base: TrainSettings
     """What no factor sets."""
@@ -76,8 +80,10 @@ class Factorial(Trainings):
     """What is analysed."""
     effect_claims: tuple[EffectClaim, ...] = ()
     """What the thesis concludes of single effects."""
+    cited: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+    """The thesis' counterparts of what is shown of each criterion (:func:`~.table_sections.table_sections`)."""
     findings: tuple["Finding", ...] = ()
-    """What else it concludes (:mod:`.findings`)."""
+    """What its words' claims are judged by (:mod:`.findings`)."""
 
     @property
     def trials(self) -> Mapping[int, str]:
@@ -117,7 +123,7 @@ class Factorial(Trainings):
         for name, analysis in ours.items():
             if name.startswith(EXPLORING):
                 continue  # these are in the table above; their pictures would double the page
-            sections += table_sections(analysis, _IN_WORDS.get(name, name), name, cited=True)
+            sections += table_sections(analysis, _IN_WORDS.get(name, name), name, self.cited.get(name, {}))
         return Analysis(
             summary=[self.words.question, *self._answer(rows, ours)],
             figures={
@@ -158,22 +164,32 @@ class Factorial(Trainings):
                 # One run says nothing of the spread.
                 if name in ours and (claim.loss == "mean" or rows.runs > 1):
                     effect = self.effect(rows, name, claim.column, ours[name], claim.loss)
-                    found.append(_effect_claim(claim, _IN_WORDS[name], theirs[claim.criterion], ours[name], effect))
-        return (*found, *(find(self, rows, ours, theirs) for find in self.findings))
+                    found.append(_effect_claim(claim, _IN_WORDS[name], theirs[claim.criterion], self.design, effect))
+        known = {name: one for find in self.findings for name, one in find(self, rows, ours, theirs).items()}
+        return (*found, *claims_of(self.words.filled(known), known))
 
     def effect(
         self, rows: TrialRows, criterion: str, column: int, analysis: TableAnalysis, loss_name: Spread = "mean"
     ) -> Interval:
-        """Return the signed effect of a column of two levels with its interval.
+        """Return the signed effect of a column of two levels with its interval over arms.
 
-        Where there are several arms they are the sample; of one arm it is the analysis that knows the margin.
+        Beside it, as its median, stands the difference of the medians: over all runs at each level, or of the spread
+        over all trials. No trial that diverges decides it. Of one arm the analysis knows the margin.
         """
+        tables = [rows.table(criterion, list(self.trials), arm) for arm in rows.arms]
+        limited = at_limit(*tables)
         if len(rows.arms) == 1:
             signed = float(analysis.effects[loss_name].signed[column - 1])
-            return Interval(signed, analysis.margin(loss_name), analysis.results.shape[1])
-        tables = [rows.table(criterion, list(self.trials), arm) for arm in rows.arms]
-        found = [effects(self.design.array, loss(table, loss_name)) for table in tables]
-        return interval([effect.signed[column - 1] for effect in found])
+            runs = analysis.results.shape[1]
+            return Interval(signed, analysis.margin(loss_name), runs, arms=1, limited=limited)
+        level = self.design.array.column(column)
+        high, low = level == level.max(), level == level.min()
+        losses = [table if loss_name == "mean" else loss(table, loss_name) for table in tables]
+        plain, robust = (
+            interval([reduced(one[high]) - reduced(one[low]) for one in losses], len(losses))
+            for reduced in (np.mean, np.median)
+        )
+        return plain._replace(median=robust, limited=limited)
 
     def _answer(self, rows: TrialRows, ours: Analyses) -> list[str]:
         """Return in words which factors matter, how much is due to one trial, and which settings are best."""
@@ -185,27 +201,35 @@ class Factorial(Trainings):
             significant = [
                 f"{self.design.factor(label).name} {_step(self.design.factor(label))} ({effect})"
                 for label, effect in found.items()
-                if abs(effect.mean) > effect.half
+                if all(abs(one.mean) > one.half for one in (effect, effect.median or effect))
             ]
-            text.append(
-                f"Significant effects on the {_IN_WORDS[name]}: {', '.join(significant) or 'none of the factors'}."
-            )
-            means = analysis.results.mean(axis=1)
-            far = int(np.argmax(np.abs(means - np.median(means))))
-            share = 2 * abs(float(means[far] - np.median(means))) / len(means)
-            text.append(
-                f"Trial {far + 1} is farthest from the others ({means[far]:.2f}, median {np.median(means):.2f}): it "
-                f"alone makes {share:.2f} of every effect and interaction."
-            )
-        text.insert(0, self._averages(rows, ours) + self._met(rows))
+            said = ", ".join(significant) or "none of the factors"
+            text.append(f"Significant effects on the {_IN_WORDS[name]}, by mean and median: {said}.")
+        text[:0] = [self._averages(rows, ours) + self._met(rows), *self.diverged(rows)]
         best = "reward" if "reward" in ours else name
         return [*text, self._best(ours[best], _IN_WORDS[best])] if judged_alike else text
+
+    @property
+    def worst(self) -> float:
+        """What an agent earns that does nothing; one that earns less has diverged."""
+        return self.base.reward.action * self.base.cutoff
+
+    def diverged(self, rows: TrialRows) -> list[str]:
+        """Return in words which agents have diverged: a result of its own."""
+        lost = {trial: int((rows.table("reward", [trial]) < self.worst).sum()) for trial in self.trials}
+        where = ", ".join(f"{count} of trial {trial}" for trial, count in lost.items() if count)
+        if not where:
+            return []
+        said = (
+            f"{sum(lost.values())} of {len(rows.rows)} agents earn less than one that does nothing ({self.worst:g})"
+        )
+        return [f"Diverged: {said}: {where}. Effects by the medians do not rest on them."]
 
     def _averages(self, rows: TrialRows, ours: Analyses) -> str:
         """Return in words the means over all trials, and beside them the thesis' where it has some."""
         said = []
         for name in [name for name in ours if name in self.thesis or not self.thesis]:
-            found = interval(rows.samples(ours[name].results.mean(axis=0)))
+            found = over_arms(rows.pooled(name, list(self.trials)))
             digits = 0 if abs(found.mean) >= _THOUSANDS else 2
             theirs = f" ({self.thesis[name].mean():,.{digits}f})" if self.thesis else ""
             said.append(f"{_IN_WORDS[name]} {found:.{digits}f}{theirs}")
@@ -263,11 +287,9 @@ def _level(level: Any) -> str:
     return f"{level:g}" if isinstance(level, float) else str(level)
 
 
-def _effect_claim(
-    claim: EffectClaim, quantity: str, their: TableAnalysis, our: TableAnalysis, effect: Interval
-) -> Claim:
-    """Return whether an effect has the sign that the thesis says, beyond chance."""
-    column, design = claim.column, our.design
+def _effect_claim(claim: EffectClaim, quantity: str, their: TableAnalysis, design: Design, effect: Interval) -> Claim:
+    """Return the claim that an effect has the sign, and where it is called slight the size, that the thesis says."""
+    column = claim.column
     theirs = float(their.effects[claim.loss].signed[column - 1])
     factor = design.on(column)
     if factor:
@@ -277,10 +299,16 @@ def _effect_claim(
             f"That {' and '.join(design.factor(label).name for label in design.label(column))} are at unlike levels"
         )
     of = "" if claim.loss == "mean" else "standard deviation of the "
+    said = f"{'raises' if claim.raises else 'lowers'} the {of}{quantity}"
+    low, high = (0.0, None) if claim.raises else (None, 0.0)
+    if claim.slight is not None:
+        said += f" slightly: by less than {claim.slight:g}"
+        low, high = -claim.slight, claim.slight
     return Claim(
-        f"{what} (column {column}) {'raises' if claim.raises else 'lowers'} the {of}{quantity}",
+        f"{what} (column {column}) {said}",
         str(Interval(theirs, their.margin(claim.loss), their.results.shape[1])),
         str(effect),
-        above(effect) if claim.raises else below(effect),
         claim.about,
+        Criterion(above=low, below=high, matters=MATTERS[claim.criterion]),
+        {"found": effect},
     )

@@ -1,20 +1,21 @@
 """What rows of several arms and runs say: means and differences over arms, courses, tables of trials.
 
-Runs on one arm share its simulation, so the arms are the sample: figures are averaged over the runs of each arm
-first. Where there is one arm alone its runs are the sample, and what is found is true of that arm.
+The arms are the sample (:mod:`.verdict`): runs are reduced to a number of each arm first, by their mean and beside it
+by their median. Where there is one arm alone its runs are the sample, and what is found is true of that arm.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pneumarm.experiments.differences import Interval, interval
 from pneumarm.experiments.experiment import Row, TrialRows
+from pneumarm.experiments.verdict import Interval, interval
 from pneumarm.experiments.words import Column, Quantity
 from pneumarm.report.page import Table
+from pneumarm.statistics import wilson
 
 Array = NDArray[np.float64]
 _SHORT = 12  # letters that are not broken over lines
@@ -25,7 +26,10 @@ _SHORT = 12  # letters that are not broken over lines
 
 def of_trial(rows: TrialRows, trial: int) -> list[list[Row]]:
     """Return the rows of ``trial`` arm by arm."""
-    return [[row for row in rows.rows if (row.arm, row.trial) == (arm, trial)] for arm in rows.arms]
+    found: dict[str, list[Row]] = {arm: [] for arm in rows.arms}
+    for row in rows.of([trial]).rows:
+        found[row.arm].append(row)
+    return list(found.values())
 
 
 def values(rows: TrialRows, figure: str, trial: int) -> Array:
@@ -66,16 +70,16 @@ def series_of(rows: TrialRows, name: str, trial: int) -> Array:
 # Means and differences ------------------------------------------------------------------------------------------
 
 
-def by_arm(table: ArrayLike) -> Array:
+def by_arm(table: ArrayLike, reduced: Callable[[Array], Any] = np.mean) -> Array:
     """Return the samples of ``table`` (arms, runs): its means by arm, or of one arm its runs.
 
-    NaN entries do not count; NaN where nothing else is left.
+    NaN entries do not count; NaN where nothing else is left. In place of the mean runs may be ``reduced`` otherwise.
     """
     found = np.atleast_2d(np.asarray(table, np.float64))
     if len(found) == 1:
         return found[0]
     known = [runs[~np.isnan(runs)] for runs in found]
-    return np.array([runs.mean() if len(runs) else math.nan for runs in known])
+    return np.array([reduced(runs) if len(runs) else math.nan for runs in known])
 
 
 def samples(rows: TrialRows, figure: str, trial: int) -> Array:
@@ -83,11 +87,45 @@ def samples(rows: TrialRows, figure: str, trial: int) -> Array:
     return by_arm(values(rows, figure, trial))
 
 
-def over_arms(table: ArrayLike) -> Interval:
-    """Return the mean of ``table`` (arms, runs) with its interval; NaN entries do not count."""
-    found = by_arm(table)
-    known = found[~np.isnan(found)]
-    return interval(known) if len(known) else Interval(math.nan, math.inf, 0)
+def over_arms(
+    *tables: ArrayLike,
+    combined: Callable[..., Array] | None = None,
+    share: bool = False,
+    limited: bool = False,
+) -> Interval:
+    """Return the mean of tables (arms, runs) over arms with its interval, and beside it that of their medians.
+
+    Args:
+        tables: NaN entries do not count.
+        combined: makes one array of those of several tables, once each is reduced to its arms.
+        share: whether all are 0 or 1; where no arm differs, each counts once in Wilson's interval of the share.
+        limited: see :attr:`.Interval.limited`.
+
+    """
+    made = [np.atleast_2d(np.asarray(table, np.float64)) for table in tables]
+    arms = int((~np.isnan(made[0])).any(axis=1).sum())
+    found = []
+    for reduced in (np.mean, np.median):
+        parts = [by_arm(table, reduced) for table in made]
+        whole = parts[0] if combined is None else combined(*parts)
+        known = whole[~np.isnan(whole)]
+        if not len(known):
+            return Interval(math.nan, math.inf, 0)
+        found.append(interval(known, arms))
+    plain, robust = found
+    if share and arms > 1 and plain.half == 0:
+        plain = plain._replace(half=max(abs(float(end) - plain.mean) for end in wilson(plain.mean * arms, arms)))
+    alike = share or (~np.isnan(made[0])).sum(axis=1).max() < 2  # one run is its mean and its median
+    return plain._replace(median=None if alike else robust, limited=limited)
+
+
+def at_limit(*tables: ArrayLike) -> bool:
+    """Return whether most of the numbers in ``tables`` are the least or the largest of all, which differ."""
+    found = np.concatenate([np.ravel(np.asarray(table, np.float64)) for table in tables])
+    found = found[~np.isnan(found)]
+    if not len(found) or np.isin(found, (0, 1)).all():
+        return False
+    return bool(max((found == found.min()).mean(), (found == found.max()).mean()) > 1 / 2)
 
 
 def mean(rows: TrialRows, figure: str, trial: int) -> Interval:
@@ -98,24 +136,27 @@ def mean(rows: TrialRows, figure: str, trial: int) -> Interval:
 def estimate(rows: TrialRows, quantity: Quantity, trial: int, base: int | None = None) -> Interval:
     """Return the mean of ``quantity`` over arms in ``trial``, less that in ``base``, its base if it has one."""
     if quantity.percent:
-        other = samples(rows, quantity.less or quantity.figure, trial if base is None else base)
-        return interval(100 * (samples(rows, quantity.figure, trial) / other - 1))
+        other = values(rows, quantity.less or quantity.figure, trial if base is None else base)
+        first = values(rows, quantity.figure, trial)
+        return over_arms(first, other, combined=lambda one, of: 100 * (one / of - 1))
 
     def of(trial: int) -> Array:
         found = values(rows, quantity.figure, trial)
         return found if quantity.less is None else found - values(rows, quantity.less, trial)
 
-    return over_arms(quantity.factor * (of(trial) if base is None else of(trial) - of(base)))
+    if base is None:
+        return over_arms(quantity.factor * of(trial), share=quantity.share)
+    return over_arms(quantity.factor * (of(trial) - of(base)), limited=at_limit(of(trial), of(base)))
 
 
 def difference(rows: TrialRows, figure: str, trial: int, reference: int) -> Interval:
     """Return by how much ``figure`` is more in ``trial`` than in ``reference``, within runs."""
-    return over_arms(values(rows, figure, trial) - values(rows, figure, reference))
+    return estimate(rows, Quantity(figure=figure), trial, reference)
 
 
 def change(rows: TrialRows, figure: str, trial: int, reference: int) -> Interval:
     """Return by how many percent ``figure`` is larger in ``trial`` than in ``reference``, arm by arm."""
-    return interval(100 * (samples(rows, figure, trial) / samples(rows, figure, reference) - 1))
+    return estimate(rows, Quantity(figure=figure, percent=True), trial, reference)
 
 
 # For people and programs ----------------------------------------------------------------------------------------

@@ -9,9 +9,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from pneumarm.drawing.colours import DARK, GREY, INK, LIGHT, MIDDLE, PALE
-from pneumarm.experiments.differences import Interval
 from pneumarm.experiments.experiment import Axis, TrialRows
 from pneumarm.experiments.means import Array, estimate, over_arms, samples, text
+from pneumarm.experiments.verdict import Interval
 from pneumarm.experiments.words import Column
 from pneumarm.report.page import Picture
 from pneumarm.report.style import key, legend_below, panels, styled

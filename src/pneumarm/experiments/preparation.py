@@ -11,12 +11,14 @@ from pneumarm.files import read_json, write_json, write_text
 from pneumarm.progress import Report
 from pneumarm.simulation import SINGLE_STEPS, Simulation, fit_store
 from pneumarm.task import BeginStates, begin_states
-from pneumarm.transitions import WHOLE_PERIODS, Store, collect
+from pneumarm.transitions import WHOLE_PERIODS, CollectSettings, Store, collect
 
 STORE = "transitions.db"
 SIMULATION = "simulation.safetensors"
 PLAN = "faults.toml"
 SETTINGS = "settings.json"
+PROCEDURES = {"thesis": WHOLE_PERIODS, "ours": CollectSettings(pulses=0.0)}
+"""How arms are recorded, by the name of the procedure; the thesis' agents know no pulses."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,13 +41,15 @@ def simulated(arm: str, folder: Path, settings: LaboratorySettings, progress: Re
 
     """
     recorded, wanted = arm, {"arm": arm, "seed": settings.seed, "transitions": settings.transitions}
-    claim(folder, wanted | ({"faults": faults} if faults else {}))
+    other = {} if settings.collecting == "thesis" else {"collecting": settings.collecting}
+    claim(folder, wanted | other | ({"faults": faults} if faults else {}))
     if faults:
         write_text(folder / PLAN, faults)
         recorded = f"{arm}{',' if ':' in arm else ':'}faults={folder / PLAN}"
     if not (folder / SIMULATION).exists():
         with open_arm(recorded, settings.seed) as opened, Store.for_arm(folder / STORE, opened.spec) as store:
-            collect(opened, store, settings.transitions, settings.seed, progress=progress, settings=WHOLE_PERIODS)
+            way = PROCEDURES[settings.collecting]
+            collect(opened, store, settings.transitions, settings.seed, progress=progress, settings=way)
         with Store.open(folder / STORE) as store:
             fit_store(store, replace(SINGLE_STEPS, seed=settings.seed)).simulation.save(folder / SIMULATION)
     simulation = Simulation.load(folder / SIMULATION)

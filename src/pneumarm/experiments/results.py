@@ -6,9 +6,10 @@ from pathlib import Path
 
 from pneumarm.console import jsonable
 from pneumarm.errors import UnusableInput
-from pneumarm.experiments.experiment import Analysis, Claim, Experiment
+from pneumarm.experiments.experiment import Analysis, Experiment
 from pneumarm.experiments.preparation import SETTINGS, STORE
 from pneumarm.experiments.sweep import arm_folder
+from pneumarm.experiments.verdict import counted
 from pneumarm.files import read_json, write_json, write_text
 from pneumarm.report.page import Section, Table, render
 from pneumarm.report.playing import playing
@@ -18,6 +19,11 @@ _HYPHEN = re.compile(r"(?<!\w)-(?=\d)")
 """Hyphen in the place of a minus."""
 PAGE = "page.html"
 RESULTS = "results.json"
+RULES = (
+    "A claim holds where the whole 95 % interval lies between the bounds that were stated, and is refuted where all "
+    "of it lies outside: two one-sided tests at 2.5 % each. A direction is also refuted where the size that matters "
+    "is ruled out. Arms are the sample; means and medians of the runs on each arm must agree, or it holds in part."
+)
 _SHOWN = 12.0
 """Seconds of an arm's recording that the page plays."""
 
@@ -25,7 +31,15 @@ _SHOWN = 12.0
 def write_page(experiment: Experiment, folder: Path, analysis: Analysis, runs: int, arms: tuple[str, ...]) -> Path:
     """Write ``page.html`` and ``results.json`` to ``folder``, one of a laboratory; return the path of the page."""
     claims = [
-        {"claim": c.text, "thesis": c.thesis, "ours": c.ours, "verdict": c.verdict, "about": c.about}
+        {
+            "claim": c.text,
+            "thesis": c.thesis,
+            "ours": c.ours,
+            "about": c.about,
+            "stated": c.criterion.stated(),
+            "medians": c.medians,
+            **c.judgement._asdict(),
+        }
         for c in analysis.claims
     ]
     of = {"experiment": experiment.name, "arms": list(arms), "runs": runs}
@@ -35,12 +49,17 @@ def write_page(experiment: Experiment, folder: Path, analysis: Analysis, runs: i
     sections = [*analysis.sections]
     summary = [*analysis.summary, where]
     if analysis.claims:
-        summary.insert(0, _count(analysis.claims))
-        rows = [[_HYPHEN.sub("−", cell) for cell in (c.text, c.thesis, c.ours, c.verdict)] for c in analysis.claims]
-        table = Table(
-            ["claim", "thesis", "here", "verdict"], rows, "What the thesis found, and what holds here.", words=True
-        )
-        sections.insert(0, Section("Claims", tables=[table]))
+        summary.insert(0, f"{counted([c.verdict for c in analysis.claims], 'claim').capitalize()}.")
+        lines = [
+            (c.text, c.criterion.stated(), c.thesis, c.ours, c.medians, verdict_in_words(c.verdict, c.judgement.why))
+            for c in analysis.claims
+        ]
+        rows = [[_HYPHEN.sub("−", cell) for cell in line] for line in lines]
+        header = ["claim", "stated beforehand", "thesis", "here", "by the medians", "verdict"]
+        table = Table(header, rows, "What the thesis found, and what holds here.", words=True)
+        sections.insert(0, Section("Claims", [RULES], tables=[table]))
+    if len(arms) == 1:
+        summary.insert(0, f"All of it is true of {arms[0]} alone, and of this recording of it: no verdict is firmer.")
     page = folder / PAGE
     opening = [seen for arm in arms[:1] if (seen := _recorded(folder.parent, arm)) is not None]
     write_text(page, render(experiment.words.title, summary, [*opening, *sections]))
@@ -80,20 +99,6 @@ def _many(count: int, what: str) -> str:
     return f"{count} {what}{'s' * (count != 1)}"
 
 
-def _count(claims: Sequence[Claim]) -> str:
-    """Say in words how many claims hold."""
-    holding, refuted, left = (
-        sum(claim.verdict == verdict for claim in claims) for verdict in ("holds", "does not hold", "open")
-    )
-    why = "95 % intervals allow both"
-    if len(claims) == 1:
-        return (
-            f"Whether the claim of the thesis holds here is open: {why}."
-            if left
-            else (f"The claim of the thesis {'holds' if holding else 'does not hold'} here.")
-        )
-    said = (
-        f"Of {len(claims)} claims of the thesis {holding or 'none'} {'holds' if holding <= 1 else 'hold'} here, "
-        f"{refuted or 'none'} {'does' if refuted <= 1 else 'do'} not"
-    )
-    return said + (f", and {left} {'is' if left == 1 else 'are'} open: {why}." if left else ".")
+def verdict_in_words(verdict: str, why: str) -> str:
+    """Return a verdict with its reason."""
+    return f"{verdict}: {why}" if why else verdict

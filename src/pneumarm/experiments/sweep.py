@@ -82,7 +82,10 @@ def sweep(
     with RowWriter(folder / ROWS) as writer:
         if not writer.rows:  # then no settings decided anything yet, as where an arm was misspelt
             (folder / SETTINGS).unlink(missing_ok=True)
-        claim(folder, {"experiment": experiment.settings(), **asdict(settings)})
+        decisive = asdict(settings)
+        if settings.collecting == "thesis":
+            del decisive["collecting"]  # laboratories of before there was a choice are gone on with
+        claim(folder, {"experiment": experiment.settings(), **decisive})
         there = {row.key for row in writer.rows}
         missing = [key for key in keys if key not in there]
         materials = {}

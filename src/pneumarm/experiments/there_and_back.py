@@ -19,7 +19,7 @@ from pneumarm.control import AgentController, drawn, make_movements
 from pneumarm.control.agent import warm_up
 from pneumarm.errors import UnusableInput
 from pneumarm.experiments.experiment import Figures, LaboratorySettings, run_seed
-from pneumarm.experiments.preparation import SIMULATION, STORE, claim
+from pneumarm.experiments.preparation import PROCEDURES, SIMULATION, STORE, claim
 from pneumarm.files import read_json, write_json
 from pneumarm.learning import Acts, Method, TrainSettings, test, train
 from pneumarm.progress import Report
@@ -27,7 +27,15 @@ from pneumarm.simulation import SINGLE_STEPS, FitSettings, Simulation, StoreFit,
 from pneumarm.simulation.quality import propagation
 from pneumarm.task import BeginStates, Movement, begin_states
 from pneumarm.task.movements import of_rows
-from pneumarm.transitions import FEWEST_TRANSITIONS, KINDS, QUANTITIES, CollectSettings, Store, collect
+from pneumarm.transitions import (
+    FEWEST_TRANSITIONS,
+    KINDS,
+    QUANTITIES,
+    WHOLE_PERIODS,
+    CollectSettings,
+    Store,
+    collect,
+)
 from pneumarm.transitions.choice import join_transitions
 from pneumarm.transitions.goals import Goals
 
@@ -43,7 +51,12 @@ TRAINING = TrainSettings(agents=4, validation_episodes=500)
 
 The first weights decide most (section 5.4.2): with a single agent a row the intervals would be twice as wide.
 """
-DECISIVE = {"transitions": TRANSITIONS, "movements": MOVEMENTS, "training": msgspec.to_builtins(TRAINING)}
+DECISIVE = {
+    "transitions": TRANSITIONS,
+    "collect": msgspec.to_builtins(WHOLE_PERIODS),
+    "movements": MOVEMENTS,
+    "training": msgspec.to_builtins(TRAINING),
+}
 """What the rows of such experiments rest on, as JSON."""
 _FIGURES = "figures.json"
 _SAME = 1e-9
@@ -78,8 +91,8 @@ class Recipe:
     """Control frequency [Hz]; None for the arm's own."""
     close_while_computing: bool = False
     """Whether the valves are closed between reading and acting."""
-    pulses: float = 0.0
-    """Share of the openings that are pulses (thesis: none)."""
+    collect: CollectSettings = WHOLE_PERIODS
+    """How, the thesis' way by default; what :func:`prepared` makes is collected as the laboratory says."""
     fit: FitSettings = SINGLE_STEPS
 
 
@@ -96,7 +109,7 @@ def collect_until(
     Whole sequences are stored, so there may be one more than needed. Returns the transitions and the minutes on the
     arm's clock, those between its sequences included.
     """
-    collecting = CollectSettings(close_while_computing=recipe.close_while_computing, pulses=recipe.pulses)
+    collecting = replace(recipe.collect, close_while_computing=recipe.close_while_computing)
     with open_arm_at(arm, seed, recipe.frequency) as there, Store.for_arm(path, there.spec) as store:
         first = max(recipe.transitions, FEWEST_TRANSITIONS)
         done = collect(there, store, first, seed, settings=collecting, progress=progress)
@@ -138,6 +151,7 @@ def prepared(arm: str, folder: Path, recipe: Recipe, settings: LaboratorySetting
     with open_arm_at(arm, settings.seed) as found:
         if recipe.frequency is not None and abs(found.spec.period * recipe.frequency - 1) < _SAME:
             recipe = replace(recipe, frequency=None)  # so that it is shared with experiments that leave it alone
+    recipe = replace(recipe, collect=PROCEDURES[settings.collecting])
     fit = replace(recipe.fit, seed=settings.seed)
     folder = trial_folder(folder, {"arm": arm, "seed": settings.seed, "recipe": asdict(recipe)})
     if not (folder / _FIGURES).exists():

@@ -2,7 +2,7 @@
 
 It says what is estimated from the rows, how each section shows them, and by what each claim of the thesis is judged.
 Texts hold what was found, by name and with the form of a number, as of :meth:`str.format`: ``lost: {drop:.2f}``,
-``{success:.1%}`` (:class:`~.differences.Interval`). Line breaks in them are spaces.
+``{success:.1%}`` (:class:`~.verdict.Interval`). Line breaks in them are spaces.
 """
 
 import re
@@ -13,9 +13,7 @@ from typing import Any
 
 import msgspec
 
-from pneumarm.experiments.differences import Interval, Verdict, above, all_hold, below, within_margin
-
-_RULE = re.compile(r"(\|?)(\w+)\|? ([<>]) (-?[\d.]+)")
+from pneumarm.experiments.verdict import Criterion
 
 
 class Quantity(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -29,15 +27,17 @@ class Quantity(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     """Trial that is subtracted, within runs: by name, or by number, negative from the last."""
     percent: bool = False
     """Whether what is subtracted is what the difference is given in percent of."""
+    share: bool = False
+    """Whether each row is a yes (1) or a no (0), as of an agent that met the criterion."""
     factor: float = 1.0
     """Multiplies the values."""
 
 
 class TrialQuantity(Quantity, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A quantity in one trial."""
+    """A quantity in one trial, or in each."""
 
-    trial: str | int
-    """Name of the trial, or its number, negative from the last."""
+    trial: str | int | None = None
+    """Name of the trial, or its number, negative from the last; None for every trial but the base."""
 
 
 class Column(Quantity, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -53,30 +53,12 @@ class Column(Quantity, frozen=True, forbid_unknown_fields=True, kw_only=True):
 class ClaimWords(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Something that the thesis says, and by what it is judged."""
 
-    about: str
-    """See :attr:`~.experiment.Claim.about`."""
     claim: str
     thesis: str
     """The thesis' evidence."""
     ours: str
-    holds: str
-    """When it holds: ``drop > 15``, ``drop < 0``, ``|drop| < 3``, several with ``and``; or the name of a verdict that
-    was found. It is open while a 95 % interval allows both."""
-
-    def verdict(self, found: Mapping[str, Any]) -> Verdict:
-        """Return the verdict that what was ``found`` allows."""
-        known: Verdict | None = found.get(self.holds)
-        return known or all_hold([_verdict(rule, found) for rule in self.holds.split(" and ")])
-
-
-def _verdict(rule: str, found: Mapping[str, Any]) -> Verdict:
-    parts = _RULE.fullmatch(rule)
-    if parts is None:
-        raise ValueError(f"{rule!r}: expected a rule such as 'drop > 15' or '|drop| < 3'")
-    interval: Interval = found[parts[2]]
-    if parts[1]:
-        return within_margin(interval, float(parts[4]))
-    return (above if parts[3] == ">" else below)(interval, float(parts[4]))
+    stated: Criterion
+    """What is stated of it before any row is computed."""
 
 
 class SectionWords(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -89,7 +71,7 @@ class SectionWords(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     called: str | None = None
     """Replaces in these names what the expression matches."""
     columns: tuple[Column, ...] = ()
-    """Columns of its table."""
+    """Columns of its table; the file may name those of ``columns.toml``."""
     table: str = ""
     """Caption of its table."""
     figure: str = ""
@@ -125,14 +107,18 @@ class Words(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     results: Mapping[str, Quantity] = {}
     """What programs get of every trial, in place of the columns."""
     sections: tuple[SectionWords, ...] = ()
-    claims: tuple[ClaimWords, ...] = ()
+    claims: Mapping[str, tuple[ClaimWords, ...]] = {}
+    """By the conclusion that they are about (:attr:`~.experiment.Claim.about`)."""
 
     def filled(self, found: Mapping[str, Any]) -> "Words":
         """Return the words with what was ``found`` in its places; claims on what is None are left out."""
         known = {name: value for name, value in found.items() if value is not None}
         words: dict[str, Any] = msgspec.to_builtins(self)
         missing = found.keys() - known.keys()
-        words["claims"] = [claim for claim in words["claims"] if claim["holds"].split()[0] not in missing]
+        for about, claims in self.claims.items():
+            words["claims"][about] = [
+                msgspec.to_builtins(claim) for claim in claims if not missing.intersection(claim.stated.names)
+            ]
         return msgspec.convert(_changed(words, lambda text: text.format_map(known)), Words)
 
 
@@ -147,5 +133,10 @@ def _changed(words: Any, change: Callable[[str], str]) -> Any:
 
 def words_of(package: str | None) -> Words:
     """Return the words in the file ``words.toml`` of a ``package``."""
-    text = (resources.files(package or "") / "words.toml").read_text(encoding="utf-8")
-    return msgspec.convert(_changed(tomllib.loads(text), lambda one: re.sub(r"\n\s*", " ", one)), Words)
+    words, known = (
+        tomllib.loads((resources.files(place) / name).read_text(encoding="utf-8"))
+        for place, name in ((package or "", "words.toml"), (__package__, "columns.toml"))
+    )
+    for section in words.get("sections", ()):
+        section["columns"] = [known[one] if isinstance(one, str) else one for one in section.get("columns", ())]
+    return msgspec.convert(_changed(words, lambda one: re.sub(r"\n\s*", " ", one)), Words)

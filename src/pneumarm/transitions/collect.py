@@ -235,7 +235,7 @@ def collect(
         transitions: how many to have in the end.
         seed: of the begin states, actions and goals.
         progress: told after each sequence.
-        settings: how; the thesis' way by default.
+        settings: how; the thesis' way is :data:`WHOLE_PERIODS`.
         controller: what acts instead of random actions.
         goals: range (joints, 2) [counts] in which goals are drawn for ``controller``, one a sequence; by default
             the range of the angle's sensor.

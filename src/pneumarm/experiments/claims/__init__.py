@@ -5,9 +5,8 @@
 ``conclusions.toml`` says what the thesis concludes and which experiments test it; what an experiment finds is in its
 ``results.json``. Nothing is run: an experiment without results is listed with the command that makes them.
 
-A claim holds, or does not, where its 95 % interval over arms lies on one side of what was claimed; else it is open. A
-conclusion *holds* where all its claims do, *does not hold* where none does and one is refuted, holds *in part* where
-some do and some are refuted, and is *open* otherwise.
+How claims are judged, and add up to the verdict on a conclusion, says :mod:`~pneumarm.experiments.verdict`. What was
+not run counts as undecided.
 """
 
 import tomllib
@@ -15,19 +14,18 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import msgspec
 
 from pneumarm.errors import UnusableInput
 from pneumarm.experiments.registry import PLACES, experiment
-from pneumarm.experiments.results import RESULTS
+from pneumarm.experiments.results import RESULTS, RULES, verdict_in_words
+from pneumarm.experiments.verdict import OPEN, VERDICTS, Verdict, counted, holm, together
 from pneumarm.files import read_bytes
 from pneumarm.report.page import Section, Table
 
-FEWEST_ARMS, FEWEST_RUNS = 5, 16
-"""Arms, and runs on all of them together, that a claim should rest on."""
-Verdict = Literal["holds", "in part", "does not hold", "open", "not run"]
+NOT_RUN = "not run"
 
 
 class Conclusion(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -38,12 +36,10 @@ class Conclusion(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Section of the thesis."""
     says: str
     """What it concludes, in words."""
-    experiments: tuple[str, ...]
+    experiments: tuple[str, ...] = ()
     """Experiments that test it."""
-
-
-class _ConclusionsFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    conclusions: tuple[Conclusion, ...]
+    lacks: str = ""
+    """What would decide it, where no experiment does."""
 
 
 class FoundClaim(msgspec.Struct, frozen=True):
@@ -52,8 +48,18 @@ class FoundClaim(msgspec.Struct, frozen=True):
     claim: str
     thesis: str
     ours: str
-    verdict: Literal["holds", "does not hold", "open"]
     about: str
+    stated: str
+    medians: str
+    verdict: Verdict
+    why: str
+    arms: int
+    p: float
+
+    @property
+    def short(self) -> str:
+        """Its verdict, and how many arms would decide it."""
+        return f"{self.verdict} ({self.arms:,} arms would)" if self.arms else self.verdict
 
 
 class Results(msgspec.Struct, frozen=True):
@@ -69,14 +75,7 @@ class Results(msgspec.Struct, frozen=True):
     def sample(self) -> str:
         """Arms and runs in words."""
         arms, runs = len(self.arms), self.runs
-        return f"{arms} arm{'s' * (arms != 1)}, {arms * runs} run{'s' * (arms * runs != 1)}" + (
-            "" if self.enough else " (few)"
-        )
-
-    @property
-    def enough(self) -> bool:
-        """Whether there are as many arms and runs as a claim should rest on."""
-        return len(self.arms) >= FEWEST_ARMS and len(self.arms) * self.runs >= FEWEST_RUNS
+        return f"{arms} arm{'s' * (arms != 1)}, {arms * runs} run{'s' * (arms * runs != 1)}"
 
 
 @dataclass(frozen=True)
@@ -89,38 +88,31 @@ class Judged:
     """Experiments that have no results yet."""
 
     @property
-    def verdict(self) -> Verdict:
-        """What its claims say together."""
-        verdicts = {claim.verdict for _, claim in self.claims}
+    def verdict(self) -> str:
+        """What its claims say together; experiments that were not run say nothing yet."""
+        verdicts = [claim.verdict for _, claim in self.claims]
         if not verdicts:
-            return "not run" if self.missing else "open"
-        if verdicts == {"holds"}:
-            return "holds"
-        if "does not hold" in verdicts:
-            return "in part" if "holds" in verdicts else "does not hold"
-        return "open"
+            return NOT_RUN if self.missing else OPEN
+        return together([*verdicts, *(OPEN for _ in self.missing)])
 
     @property
     def parts(self) -> Mapping[str, tuple[str, ...]]:
         """Its claims by their verdict."""
-        found = {v: tuple(c.claim for _, c in self.claims if c.verdict == v) for v in _PARTS}
+        found = {v: tuple(c.claim for _, c in self.claims if c.verdict == v) for v in VERDICTS}
         return {v: these for v, these in found.items() if these}
 
     def explained(self) -> str:
         """Return the verdict in words, and what it comes from where its claims differ."""
-        if len(self.parts) < 2:
-            return f"Verdict: {self.verdict}."
-        said = [f"{v.capitalize()}: {'; '.join(these)}." for v, these in self.parts.items()]
+        said = [f"{v.capitalize()}: {'; '.join(these)}." for v, these in self.parts.items() if len(self.parts) > 1]
+        said += [f"Not run: {', '.join(self.missing)}."] if self.missing else []
+        said += [f"What would decide it: {self.conclusion.lacks}."] if self.conclusion.lacks else []
         return " ".join([f"Verdict: {self.verdict}.", *said])
-
-
-_PARTS = ("holds", "does not hold", "open")
 
 
 def conclusions() -> tuple[Conclusion, ...]:
     """Return what the thesis concludes, in its order."""
     text = (resources.files(__name__) / "conclusions.toml").read_text(encoding="utf-8")
-    return msgspec.convert(tomllib.loads(text), _ConclusionsFile).conclusions
+    return tuple(msgspec.convert({"key": key, **each}, Conclusion) for key, each in tomllib.loads(text).items())
 
 
 def keys_of(experiment: str) -> frozenset[str]:
@@ -186,51 +178,60 @@ def judge(results: Mapping[str, Results]) -> list[Judged]:
 def sections(judged: Sequence[Judged], laboratory: Path) -> list[Section]:
     """Return the sections of the page: all verdicts, the evidence for each, and what was not run yet."""
     overview = Table(
-        ["conclusion of the thesis", "section", "verdict", "claims that hold", "refuted", "open"],
+        ["conclusion of the thesis", "section", "verdict", "claims that hold", "in part", "refuted", "undecided"],
         [
             [
                 each.conclusion.says,
                 each.conclusion.section,
                 each.verdict,
-                *(str(sum(c.verdict == v for _, c in each.claims)) for v in ("holds", "does not hold", "open")),
+                *(str(sum(c.verdict == v for _, c in each.claims)) for v in VERDICTS),
             ]
             for each in judged
         ],
         "What the thesis concludes, and whether it holds here.",
         words=True,
     )
-    made = [Section("Verdicts", _RULES, tables=[overview])]
-    made += [_evidence(each) for each in judged if each.claims]
+    made = [Section("Verdicts", [RULES, _multiplicity(judged)], tables=[overview])]
+    made += [_evidence(each) for each in judged if each.claims or each.conclusion.lacks]
     missing = list(dict.fromkeys(name for each in judged for name in each.missing))
-    few = {r.experiment: r for each in judged for r, _ in each.claims if not r.enough}
-    if missing or few:
-        rows = [[name, "no results", f"pneumarm experiment {name} --out {laboratory}"] for name in missing]
-        rows += [[name, r.sample, _more(name, laboratory)] for name, r in few.items()]
-        table = Table(["experiment", "what there is", "command"], rows, "What would make the page whole.", words=True)
-        made.append(
-            Section(
-                "Still to be run",
-                [f"A claim should rest on {FEWEST_ARMS} arms and {FEWEST_RUNS} runs at least."],
-                tables=[table],
-            )
-        )
+    rows = [[name, "no results", f"pneumarm experiment {name} --out {laboratory}"] for name in missing]
+    needed: dict[str, int] = {}
+    for results, claim in _all_claims(judged):
+        if claim.arms:
+            needed[results.experiment] = max(claim.arms, needed.get(results.experiment, 0))
+    for name, arms in needed.items():
+        command = f"pneumarm experiment {name} --out {laboratory} --arms $(seq -f virtual:seed=%g -s , 1 {arms})"
+        rows.append([name, f"{arms:,} arms would decide all of its claims", command])
+    if rows:
+        table = Table(["experiment", "what it lacks", "command"], rows, "What would decide more.", words=True)
+        text = "Arms by the spread found: 95 % power at the size that matters to each claim."
+        made.append(Section("Still to be run", [text], tables=[table]))
     return made
 
 
-_RULES = (
-    "A claim holds, or does not hold, where the 95 % interval of what was found lies on one side of what is claimed; "
-    "else it is open. Runs on one arm share its simulation, so intervals are over arms.",
-    "A conclusion holds where all its claims do. It does not hold where one is refuted and none holds, and holds in "
-    "part where some hold and some are refuted; otherwise it is open. Of twenty claims that are neither true nor "
-    "false one is judged by chance.",
-)
+def _all_claims(judged: Sequence[Judged]) -> list[tuple[Results, FoundClaim]]:
+    return [pair for each in judged for pair in each.claims]
+
+
+def _multiplicity(judged: Sequence[Judged]) -> str:
+    """Return in words how many claims are judged, and how many verdicts stand when all are to be right at once."""
+    decided = [claim for _, claim in _all_claims(judged) if claim.verdict in ("holds", "does not hold")]
+    stand = sum(holm([claim.p for claim in decided]))
+    return (
+        f"{len(_all_claims(judged))} claims are judged one by one, each with an error of 2.5 %: of forty that chance "
+        f"alone decides one is wrong. Of the {len(decided)} that hold or are refuted {stand} also stand by their "
+        "means when all are to be right at once (Holm's correction). A conclusion holds, or is refuted, only where "
+        "all of its claims are: no single one decides it by chance."
+    )
+
+
 HEADER = ("claim", "thesis", "here, with 95 % intervals", "from", "verdict")
 
 
 def evidence(judged: Judged) -> list[list[str]]:
     """Return a line for each claim, by :data:`HEADER`: thesis beside ours, arms and runs, verdict."""
     return [
-        [claim.claim, claim.thesis, claim.ours, f"{results.experiment}: {results.sample}", claim.verdict]
+        [claim.claim, claim.thesis, claim.ours, f"{results.experiment}: {results.sample}", claim.short]
         for results, claim in judged.claims
     ]
 
@@ -247,46 +248,23 @@ def as_markdown(judged: Sequence[Judged]) -> str:
 
 
 def _evidence(judged: Judged) -> Section:
-    table = Table(
-        list(HEADER),
-        evidence(judged),
-        f"Thesis section {judged.conclusion.section.removeprefix('Thesis section ')}.",
-        words=True,
-    )
-    return Section(judged.conclusion.says, [judged.explained()], tables=[table])
-
-
-def _more(name: str, laboratory: Path) -> str:
-    own = experiment(name).arms
-    arms = ",".join(own if len(own) >= FEWEST_ARMS else (f"virtual:seed={n}" for n in range(1, FEWEST_ARMS + 1)))
-    runs = -(-FEWEST_RUNS // FEWEST_ARMS)
-    return f"pneumarm experiment {name} --out {laboratory} --arms {arms} --runs {runs}"
+    header = [HEADER[0], "stated beforehand", *HEADER[1:3], "by the medians", *HEADER[3:]]
+    lines = [
+        [text, claim.stated, thesis, ours, claim.medians, sample, verdict_in_words(claim.verdict, claim.why)]
+        for (text, thesis, ours, sample, _), (_, claim) in zip(evidence(judged), judged.claims, strict=True)
+    ]
+    caption = f"Thesis section {judged.conclusion.section.removeprefix('Thesis section ')}."
+    tables = [Table(header, lines, caption, words=True)] if lines else []
+    return Section(judged.conclusion.says, [judged.explained()], tables=tables)
 
 
 def summary(judged: Sequence[Judged]) -> list[str]:
     """Return in words how many conclusions hold."""
-    order: tuple[Verdict, ...] = ("holds", "in part", "does not hold", "open", "not run")
-    counts = {verdict: sum(each.verdict == verdict for each in judged) for verdict in order}
-    words = {
-        "holds": ("holds", "hold"),
-        "in part": ("holds in part", "hold in part"),
-        "does not hold": ("does not hold", "do not hold"),
-        "open": ("is open", "are open"),
-        "not run": ("was not tested yet", "were not tested yet"),
-    }
-
-    def told(count: int, verdict: Verdict) -> str:
-        return f"{count} {words[verdict][count != 1]}"
-
-    said = ", ".join(told(count, verdict) for verdict, count in counts.items() if count)
-    claims = [claim for each in judged for _, claim in each.claims]
-    holding = sum(claim.verdict == "holds" for claim in claims)
-    refuted = sum(claim.verdict == "does not hold" for claim in claims)
-    return [
-        f"Of {len(judged)} conclusions {said}. They rest on {len(claims)} claims: {told(holding, 'holds')}, "
-        f"{told(refuted, 'does not hold')}, {told(len(claims) - holding - refuted, 'open')}. All of it is made "
-        "from the results of the experiments."
-    ]
+    said = counted([each.verdict for each in judged], "conclusion").capitalize()
+    of = counted([claim.verdict for _, claim in _all_claims(judged)], "claim")
+    alone = {name for r, _ in _all_claims(judged) if len(r.arms) == 1 for name in r.arms}
+    speaks = [f"What rests on one arm speaks of that arm alone: {', '.join(sorted(alone))}."] if alone else []
+    return [f"{said}. They rest on {of}. All of it is made from the results of the experiments.", *speaks]
 
 
 def claims_figures(judged: Sequence[Judged]) -> dict[str, Any]:
@@ -296,6 +274,7 @@ def claims_figures(judged: Sequence[Judged]) -> dict[str, Any]:
             {
                 **msgspec.to_builtins(each.conclusion),
                 "verdict": each.verdict,
+                "explained": each.explained(),
                 "missing": list(each.missing),
                 "claims": [
                     {

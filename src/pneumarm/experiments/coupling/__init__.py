@@ -6,9 +6,6 @@ these arms; the thesis' agents learn one goal in it, that in the middle, a polic
 any other arm there is nothing to turn down.
 
     pneumarm experiment coupling --out laboratory
-
-Answer here, on arms 1 to 3: with all of the coupling the error of the angle is 41 ± 32 % larger than without. That it
-costs the policy reward, or the thesis' agents episodes, is not shown; both did worse on one of the arms without it.
 """
 
 from pneumarm.experiments.coupling.couplings import coupling

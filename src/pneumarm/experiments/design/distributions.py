@@ -53,6 +53,12 @@ def f_tail(ratio: float, numerator: float, denominator: float) -> float:
     return incomplete_beta(denominator / (denominator + numerator * ratio), denominator / 2, numerator / 2)
 
 
+def t_tail(t: float, freedom: float) -> float:
+    """Return P(T > ``t``) for Student's T with ``freedom`` degrees."""
+    beyond = incomplete_beta(freedom / (freedom + t * t), freedom / 2, 0.5) / 2
+    return beyond if t > 0 else 1.0 - beyond
+
+
 @functools.lru_cache(maxsize=256)
 def t_quantile(probability: float, freedom: float) -> float:
     """Return t with P(|T| <= t) = ``probability`` for Student's T with ``freedom`` degrees, which may be broken."""

@@ -1,6 +1,7 @@
 """An analysis as sections of a page."""
 
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 
 import numpy as np
 
@@ -13,10 +14,13 @@ from pneumarm.report.page import Picture, Section, Table
 _MOST_RUNS = 8  # side by side; of more only the losses are shown
 
 
-def table_sections(analysis: TableAnalysis, quantity: str, prefix: str = "", *, cited: bool = False) -> list[Section]:
+def table_sections(
+    analysis: TableAnalysis, quantity: str, prefix: str = "", cited: Mapping[str, str] = MappingProxyType({})
+) -> list[Section]:
     """Return the sections on one table of results of a ``quantity``; ``prefix`` keeps titles of several apart.
 
-    ``cited`` names the thesis' counterparts, for experiments that are its own. Without factors there are effects of
+    ``cited`` names the thesis' counterparts of the parts, for experiments that are its own: of ``results``, ``runs``,
+    ``half-normal runs``, ``mean``, ``std``, ``half-normal`` and ``ranking``. Without factors there are effects of
     columns, and no best settings.
     """
     factors = analysis.design.factors
@@ -51,12 +55,12 @@ def _title(prefix: str, title: str) -> str:
     return whole[0].upper() + whole[1:]
 
 
-def _caption(text: str, counterpart: str, cited: bool) -> str:
-    """Return the caption ``text``, with its ``counterpart`` in the thesis if that is ``cited``."""
-    return f"{text} ({counterpart})." if cited else f"{text}."
+def _caption(text: str, part: str, cited: Mapping[str, str]) -> str:
+    """Return the caption ``text`` of a part, with its counterpart in the thesis if there is one."""
+    return f"{text} (as thesis {cited[part]})." if part in cited else f"{text}."
 
 
-def _results(analysis: TableAnalysis, quantity: str, cited: bool) -> Table:
+def _results(analysis: TableAnalysis, quantity: str, cited: Mapping[str, str]) -> Table:
     """Return the loss table: trials with their settings, results and losses."""
     factors = analysis.design.factors
     runs = analysis.results.shape[1] if analysis.results.shape[1] <= _MOST_RUNS else 0
@@ -74,10 +78,10 @@ def _results(analysis: TableAnalysis, quantity: str, cited: bool) -> Table:
         )
     header = ["trial", *(f"{f.label}: {f.name}" for f in factors), *(f"run {r + 1}" for r in range(runs)), *losses]
     caption = f"Loss table: {quantity} by trial and run, and its losses"
-    return Table(header, rows, _caption(caption, "as thesis table 5.5", cited))
+    return Table(header, rows, _caption(caption, "results", cited))
 
 
-def _pictures(analysis: TableAnalysis, quantity: str, cited: bool) -> list[Picture]:
+def _pictures(analysis: TableAnalysis, quantity: str, cited: Mapping[str, str]) -> list[Picture]:
     """Return the effects plots and the half-normal plots."""
     largest = _column(analysis, analysis.effects["mean"].ranking[0])
     drawn = []
@@ -86,37 +90,31 @@ def _pictures(analysis: TableAnalysis, quantity: str, cited: bool) -> list[Pictu
         drawn.append(
             Picture(
                 effects_figure(analysis, lines, quantity),
-                _caption(f"Effects on the {quantity} for all runs apart, a line a run", "as thesis fig. 5.1", cited),
+                _caption(f"Effects on the {quantity} for all runs apart, a line a run", "runs", cited),
                 f"{len(lines)} lines in {analysis.design.array.columns} columns.",
             )
         )
         drawn.append(
             Picture(
                 half_normal_runs_figure(analysis, quantity),
-                _caption(
-                    "Half-normal probability plots for all runs apart, a line a run", "as thesis fig. C.2", cited
-                ),
+                _caption("Half-normal probability plots for all runs apart, a line a run", "half-normal runs", cited),
                 f"Largest effects by run: {', '.join(f'{found.sizes.max():.2f}' for found in analysis.runs)}.",
             )
         )
     names = tuple(name for name in ("mean", "std") if name in analysis.effects)
-    for name, number in zip(names, ("5.2", "5.3"), strict=False):
+    for name in names:
         largest = _column(analysis, analysis.effects[name].ranking[0])
         drawn.append(
             Picture(
                 effects_figure(analysis, {name: analysis.effects[name]}, f"{name} of {quantity}"),
-                _caption(f"Effects on the {name} of the {quantity}", f"as thesis fig. {number}", cited),
+                _caption(f"Effects on the {name} of the {quantity}", name, cited),
                 f"The largest effect is that of column {largest}.",
             )
         )
     drawn.append(
         Picture(
             half_normal_figure(analysis, names, quantity),
-            _caption(
-                "Half-normal probability plots of the effects, with Lenth's margins",
-                "thesis eq. 5.3; as fig. 5.4, 5.5",
-                cited,
-            ),
+            _caption("Half-normal probability plots of the effects, with Lenth's margins", "half-normal", cited),
             "; ".join(f"{name}: beyond the margin {_listed(analysis, name)}" for name in names),
         )
     )
@@ -167,7 +165,7 @@ def _column(analysis: TableAnalysis, column: int) -> str:
     return f"{column} ({label})" if label else str(column)
 
 
-def _rankings(analysis: TableAnalysis, cited: bool) -> Table:
+def _rankings(analysis: TableAnalysis, cited: Mapping[str, str]) -> Table:
     names = [name for name in ("mean", "std") if name in analysis.effects]
     found: Sequence[Effects] = [analysis.effects[name] for name in names]
     rows = []
@@ -178,7 +176,7 @@ def _rankings(analysis: TableAnalysis, cited: bool) -> Table:
             row += [_column(analysis, column), f"{effect.sizes[column - 1]:.2f}"]
         rows.append(row)
     header = ["rank", *(part for name in names for part in (name, "effect"))]
-    caption = _caption("Columns by the size of their effects", "as thesis tables 5.6 and 5.9", cited)
+    caption = _caption("Columns by the size of their effects", "ranking", cited)
     return Table(header, rows, caption)
 
 

@@ -8,10 +8,6 @@ Differences from the thesis: 1000 movements to adapt, not 2500; 60 degrees, not 
 goals of some arms.
 
     pneumarm experiment displacement
-
-Answer here, on five arms: actions grow with the displacement and switches less so, as in the thesis. Short movements
-switch more often an action and go farther out of the way, but by 1.3 ± 0.7 degrees, not 20, and they succeed as often
-as long ones. A quarter of the movements of this learning agent switch more than five times, in the thesis a few.
 """
 
 from pneumarm.experiments.displacement.typical import Displacement

@@ -6,10 +6,10 @@ import numpy as np
 
 from pneumarm.arm import ArmSpec
 from pneumarm.experiments.analysis import analysed, filled_words
-from pneumarm.experiments.differences import Interval
 from pneumarm.experiments.displacement.typical import AFTER, SERIES, Displacement
 from pneumarm.experiments.experiment import Analysis, TrialRows
 from pneumarm.experiments.means import estimate, from_series, mean, series_of
+from pneumarm.experiments.verdict import Interval
 from pneumarm.experiments.words import Quantity
 from pneumarm.report.data import Demonstration
 from pneumarm.report.figures.displacement import against_displacement
@@ -49,7 +49,7 @@ def analysis(experiment: Displacement, rows: TrialRows) -> Analysis:
         rows,
         words,
         found,
-        figures={name: mean(rows, name, 1)._asdict() for name in sorted(rows.figures) if "#" not in name},
+        figures={name: mean(rows, name, 1).figures() for name in sorted(rows.figures) if "#" not in name},
         pictures={0: [scatter], 1: pictures},
         tables={0: [_thirds(rows, words.sections[0].table)], 1: [typical]},
     )

@@ -5,10 +5,6 @@ fitted, to 220 minutes. One collection is cut short after each of these; from ea
 and the thesis' agent trained and moved on the arm. Goals and begin states are the same for all parts.
 
     pneumarm experiment enough-data --out laboratory
-
-Answer here: the errors of a step fall until some 10 to 20 minutes, while cells go on being filled anew at 220; on
-five arms more minutes earned the thesis' agent nothing that can be told from chance. ``python -m benchmarks
-minutes`` asks the same of the agent that pneumarm trains by default, which varies less.
 """
 
 from pneumarm.experiments.enough_data.minutes import EnoughData

@@ -10,9 +10,9 @@ import msgspec
 import numpy as np
 
 from pneumarm.experiments.experiment import Axis, Experiment, Figures, LaboratorySettings
-from pneumarm.experiments.preparation import STORE
+from pneumarm.experiments.preparation import PROCEDURES, STORE
 from pneumarm.experiments.there_and_back import (
-    MOVEMENTS,
+    DECISIVE,
     TRAINING,
     Prepared,
     Recipe,
@@ -52,7 +52,7 @@ class EnoughData(Experiment):
 
     def settings(self) -> Any:
         """Return minutes and training."""
-        return {"minutes": list(self.minutes), "movements": MOVEMENTS, "training": msgspec.to_builtins(TRAINING)}
+        return {**DECISIVE, "minutes": list(self.minutes)}
 
     def prepare(self, arm: str, folder: Path, settings: LaboratorySettings, progress: Report) -> list[Prepared]:
         """Return a simulation of every part of one collection, which goes on between the fits.
@@ -61,10 +61,12 @@ class EnoughData(Experiment):
         question.
         """
         seed = settings.seed
-        whole = trial_folder(folder, {"arm": arm, "seed": seed, "minutes": list(self.minutes)})
+        collecting = PROCEDURES[settings.collecting]
+        way = msgspec.to_builtins(collecting)
+        whole = trial_folder(folder, {"arm": arm, "seed": seed, "minutes": list(self.minutes), "collect": way})
         made = []
         for number, minutes in enumerate(self.minutes):
-            recipe = Recipe(minutes=minutes)
+            recipe = Recipe(minutes=minutes, collect=collecting)
             kept, file = whole / f"{number}.json", whole / f"{number}.safetensors"
             if not kept.exists():
                 transitions, took = collect_until(whole / STORE, arm, seed, recipe, progress)

@@ -8,9 +8,6 @@ traces and discount factor at three levels each on L9, with SARSA; trial 10 of a
 
 The best of nine trials looks better than it is. So the settings are chosen by the odd runs and compared with trial
 10 on the even ones, which had no part in the choice.
-
-On arms 1 to 5, four runs each, the settings so chosen (learning rate 0.05, 5 neurons, lambda 0.1, gamma 0.98) earn
-26 ± 33 more than trial 10: no significant difference, though low learning rates are ahead throughout.
 """
 
 from pneumarm.experiments.fine_tuning.levels import FineTuning

@@ -1,18 +1,21 @@
 """What the rows say of the array, and of the settings chosen by odd runs in the even ones."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from pneumarm.drawing.colours import DARK, GREY, MIDDLE
 from pneumarm.experiments.analysis import analysed, filled_words
-from pneumarm.experiments.differences import above, interval
 from pneumarm.experiments.experiment import Analysis, TrialRows
 from pneumarm.experiments.fine_tuning.levels import FineTuning
+from pneumarm.experiments.means import over_arms
 from pneumarm.experiments.pictures import dots
 from pneumarm.experiments.trainings import CRITERIA
+from pneumarm.experiments.verdict import Interval
 from pneumarm.learning import TrainSettings
 from pneumarm.report.page import Picture, Section
 from pneumarm.report.style import panels, styled
@@ -26,7 +29,7 @@ def analysis(experiment: FineTuning, rows: TrialRows) -> Analysis:
     of_array = array.analyse(rows.of(array.trials))
     words, found = filled_words(experiment, rows, **confirmation(experiment, rows))
     shown = {
-        CRITERIA[name]: [interval(rows.samples(values)) for values in rows.table(name, list(trials))]
+        CRITERIA[name]: [over_arms(rows.pooled(name, [trial])) for trial in trials]
         for name in ("reward", "success_rate", "episodes")
     }
     of_trials, discount = words.sections
@@ -46,21 +49,21 @@ def analysis(experiment: FineTuning, rows: TrialRows) -> Analysis:
     return replace(made, sections=sections, summary=[*made.summary, *of_array.summary[1:]])
 
 
-def confirmation(experiment: FineTuning, rows: TrialRows) -> dict[str, str]:
+def confirmation(experiment: FineTuning, rows: TrialRows) -> dict[str, Any]:
     """Return whether the trial that is best in odd runs beats trial 10 in even ones, and which it is in words."""
     reward = rows.table("reward", list(experiment.trials))
     odd = np.tile(np.arange(1, rows.runs + 1) % 2 == 1, len(rows.arms))
     if odd.all():
         return {
-            "verdict": "open",
+            "difference": Interval(math.nan, math.inf, 0),
             "ours": "one run: nothing left to confirm with",
             "chosen": "One run confirms nothing.",
         }
     best = int(np.argmax(reward[:-1, odd].mean(axis=1)))
     even = reward[:, ~odd]
-    difference = interval(rows.samples(even[best] - even[-1]))
+    difference = over_arms((even[best] - even[-1]).reshape(len(rows.arms), -1))
     return {
-        "verdict": above(difference),
+        "difference": difference,
         "ours": f"{difference}: {even[best].mean():.2f} against {even[-1].mean():.2f}",
         "chosen": f"Best in odd runs: {experiment.trials[best + 1]} (trial {best + 1}). In even runs it differs from "
         f"trial 10 of all-goals by {difference} of reward.",

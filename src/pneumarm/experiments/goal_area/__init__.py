@@ -5,10 +5,6 @@ may be possible. Agents learn each goal area by themselves and are tested with i
 as it is in the morning: greedy and without learning, the same begin states and goals.
 
     pneumarm experiment goal-area
-
-Answer here, on five arms: 96 % of the movements succeed with the thesis' goal area. Half the speed or half the angle
-costs some 20 of reward each, and 6 points of success; both cost twice as much. Fewer than half of the movements end
-at less than half the speed that is allowed.
 """
 
 from pneumarm.experiments.goal_area.areas import GoalArea

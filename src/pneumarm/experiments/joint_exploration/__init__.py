@@ -5,9 +5,6 @@ demanding criterion. The thesis' agents learn one goal, that in the middle, with
 one of two explores with 0.5, with a low rate, with half the criterion at the beginning, and without shaping.
 
     pneumarm experiment joint-exploration --out laboratory
-
-Answer here, on arms 1 to 3: three of four actions explore indeed, but neither lower rates nor half the criterion are
-shown to save episodes with the goal in the middle.
 """
 
 from pneumarm.experiments.joint_exploration.rates import VARIED, JointExploration

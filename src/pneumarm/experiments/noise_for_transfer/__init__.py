@@ -5,10 +5,6 @@ times the deviation of the fit's error; besides, no noise at all. In every run a
 and make the same movements on the arm.
 
     pneumarm experiment noise-for-transfer --out laboratory
-
-Answer here: agents trained without noise earn as much on the arm as with the thesis' noise, whose simulation is
-better than the thesis'. Four times the noise costs some 13 of reward, and far more where a slow arm gets as much as a
-fast one. More noise shortens the training instead of lengthening it.
 """
 
 from pneumarm.experiments.noise_for_transfer.noises import NoiseForTransfer

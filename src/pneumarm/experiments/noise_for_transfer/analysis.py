@@ -5,11 +5,11 @@ from collections.abc import Iterable
 import numpy as np
 
 from pneumarm.experiments.analysis import analysed, filled_words
-from pneumarm.experiments.differences import Interval
 from pneumarm.experiments.experiment import Analysis, Axis, TrialRows
 from pneumarm.experiments.means import difference, over_arms, values
 from pneumarm.experiments.noise_for_transfer.noises import NoiseForTransfer
 from pneumarm.experiments.pictures import against
+from pneumarm.experiments.verdict import Interval
 
 _ONCE = 1.0  # as large as the fit's error, as in the thesis
 

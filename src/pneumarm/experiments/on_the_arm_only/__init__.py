@@ -15,11 +15,6 @@ Numbered differences from the thesis:
 3. Goals are in the middle 80 % of the range between the ends that the arm reaches at rest.
 
     pneumarm experiment on-the-arm-only
-
-On arms 1 to 5, four runs each, all 20 agents meet the criterion, after 23.0 ± 1.9 h and 17,000 ± 1,200 movements:
-the guess of 29 h is right in its order, because movements soon take less than the cut-off that it counts with (4.9 s,
-not 7.05). Frozen and greedy they then reach 91 ± 4 % of their goals, and earn 28 ± 26 more than single agents from
-the same weights that learned in the simulation.
 """
 
 from pneumarm.experiments.on_the_arm_only.from_scratch import OnTheArmOnly

@@ -6,11 +6,11 @@ from dataclasses import replace
 from pneumarm.experiments.analysis import analysed, filled_words
 from pneumarm.experiments.comparison import side_by_side
 from pneumarm.experiments.design.table import packaged_results
-from pneumarm.experiments.differences import interval
 from pneumarm.experiments.experiment import Analysis, TrialRows
 from pneumarm.experiments.means import Array
 from pneumarm.experiments.optimal_settings.confirmation import DerivedSettings
 from pneumarm.experiments.trainings import CRITERIA
+from pneumarm.experiments.verdict import interval
 
 _CRITERIA = ("reward", "actions", "switches", "episodes")
 _TRIAL_10 = 10

@@ -17,8 +17,6 @@ class DerivedSettings(Trainings):
 
     name = "optimal-settings"
     words = words_of(__package__)
-    runs = 8
-    arms = ("virtual",)
 
     @property
     def trials(self) -> Mapping[int, str]:

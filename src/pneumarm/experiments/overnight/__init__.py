@@ -6,10 +6,6 @@ days, learning on the first alone, or never learning (so that what comes back is
 without a night, because what a learning agent earns goes up and down anyway.
 
     pneumarm experiment overnight
-
-On arms 1 to 5, four runs each, there is no hitch: the agent that never learns loses -0.1 ± 2.6 of its reward after 14
-h, and the one that learns -1.2 ± 5.1 against the same agent without a night. There is nothing to be seen that warming
-up or learning would bring back.
 """
 
 from pneumarm.experiments.overnight.days import Overnight

@@ -3,11 +3,11 @@
 import numpy as np
 
 from pneumarm.experiments.analysis import analysed, filled_words
-from pneumarm.experiments.differences import Interval, above
 from pneumarm.experiments.experiment import Analysis, TrialRows
 from pneumarm.experiments.means import Array, blocks, over_arms
 from pneumarm.experiments.overnight.days import DAYS, FROZEN, LEARNING, NO_NIGHT, Overnight
 from pneumarm.experiments.pictures import Curve, courses
+from pneumarm.experiments.verdict import Interval
 from pneumarm.report.page import Table
 
 _SPAN = 3  # blocks before the night, and at the end, that are the level of a day
@@ -48,10 +48,10 @@ def analysis(experiment: Overnight, rows: TrialRows) -> Analysis:
         words,
         found,
         figures={
-            "drop": {DAYS[t].words: one._asdict() for t, one in drops.items()},
-            "gain": {DAYS[t].words: one._asdict() for t, one in gains.items()},
-            "lost": lost._asdict(),
-            "adapted": adapted._asdict(),
+            "drop": {DAYS[t].words: one.figures() for t, one in drops.items()},
+            "gain": {DAYS[t].words: one.figures() for t, one in gains.items()},
+            "lost": lost.figures(),
+            "adapted": adapted.figures(),
         },
         pictures={0: [picture]},
         tables={0: [Table(header, lines, two_days.table)]},
@@ -61,7 +61,7 @@ def analysis(experiment: Overnight, rows: TrialRows) -> Analysis:
 def answer(lost: Interval, frozen: Interval) -> str:
     """Return in words for whom the night significantly costs reward."""
     agents = {"an agent that learns": lost, "one that never learns": frozen}
-    costs = [words for words, found in agents.items() if above(found) == "holds"]
+    costs = [words for words, found in agents.items() if found.low > 0]
     if costs:
         return f"The night costs {' and '.join(costs)} reward."
     return "No drop is shown, so what would restore the reward cannot be seen."

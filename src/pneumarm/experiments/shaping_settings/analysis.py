@@ -13,12 +13,12 @@ from pneumarm.drawing.colours import DARK, GREY, MIDDLE
 from pneumarm.experiments.analysis import analysed, filled_words
 from pneumarm.experiments.comparison import mean_and_spread
 from pneumarm.experiments.design.table import packaged_results
-from pneumarm.experiments.differences import Interval, Verdict, below, interval
 from pneumarm.experiments.experiment import Analysis, TrialRows
-from pneumarm.experiments.means import Array
+from pneumarm.experiments.means import Array, difference, mean
 from pneumarm.experiments.pictures import dots
 from pneumarm.experiments.shaping_settings.shapings import ShapingSettings
 from pneumarm.experiments.trainings import CRITERIA, LEARNING
+from pneumarm.experiments.verdict import Interval, interval
 from pneumarm.learning import TrainSettings
 from pneumarm.learning.online.shaping import initial_deviation, stage
 from pneumarm.report.page import Picture, Table
@@ -26,6 +26,7 @@ from pneumarm.report.style import panels, styled
 
 _CRITERIA = ("reward", "success_rate", LEARNING, "actions", "switches", "episodes", "met")
 _SHOWN = ("reward", "success_rate", "episodes")
+_SMALLEST = 1e-9
 
 Tables = Mapping[str, NDArray[np.float64]]
 """Tables by figure, shapes (trials, runs)."""
@@ -36,22 +37,19 @@ Differences = Mapping[str, list[Interval | None]]
 def analysis(experiment: ShapingSettings, rows: TrialRows) -> Analysis:
     """Return every trial's results and its difference from the thesis' settings within runs."""
     tables = {name: rows.table(name, list(experiment.trials)) for name in _CRITERIA}
-    # From here on columns are samples: runs where there is one arm, else the arms.
-    samples = {name: np.stack([rows.samples(line) for line in table]) for name, table in tables.items()}
-    differences = {name: _differences(experiment, table) for name, table in samples.items()}
-    words, found = filled_words(
-        experiment,
-        rows,
-        **shaping_evidence(experiment, tables, len(rows.arms)),
-        **{f"significant_{name}": _significant(experiment, name, differences) for name in ("reward", "episodes")},
-    )
+    references = {n: experiment.reference(n) for n in experiment.trials}
+    differences = {
+        name: [None if n == of else difference(rows, name, n, of) for n, of in references.items()]
+        for name in _CRITERIA
+    }
+    words, found = filled_words(experiment, rows, **shaping_evidence(experiment, tables, len(rows.arms)))
     strategy, results = words.sections
     drawn = Picture(
         strategy_figure(experiment.train_settings(1), ArmSpec()),
         strategy.figure,
         "Exploration falls from 0.5 to 0.05 and temperature from 20 to 1; the criterion rises to 0.95.",
     )
-    shown = {CRITERIA[name]: [interval(values) for values in samples[name]] for name in _SHOWN}
+    shown = {CRITERIA[name]: [mean(rows, name, trial) for trial in experiment.trials] for name in _SHOWN}
     changes = {
         name: [[each.mean, each.half] if each else None for each in ones] for name, ones in differences.items()
     }
@@ -78,10 +76,10 @@ def shaping_evidence(experiment: ShapingSettings, tables: Tables, arms: int) -> 
         for one in ("all_goals", "no_shaping")
     )
     spreads = (one["reward"].std(axis=1, ddof=1).mean() for one in (with_it, without_it))
-    spread, narrower = _spread(tables["reward"][shaped], tables["reward"][without], arms)
+    in_words, spread = _spread(tables["reward"][shaped], tables["reward"][without], arms)
     return {
+        "in_words": in_words,
         "spread": spread,
-        "narrower": narrower,
         "share": _share(tables["met"][without]),
         "share_worn": _share(tables["met"][worn_without]),
         "share_shaped": _share(tables["met"][worn]),
@@ -92,22 +90,6 @@ def shaping_evidence(experiment: ShapingSettings, tables: Tables, arms: int) -> 
 
 
 _THEIRS = ("reward", "episodes")
-
-
-def _differences(experiment: ShapingSettings, table: Array) -> list[Interval | None]:
-    references = {n: experiment.reference(n) for n in experiment.trials}
-    return [None if n == of else interval(table[n - 1] - table[of - 1]) for n, of in references.items()]
-
-
-def _significant(experiment: ShapingSettings, name: str, differences: Differences) -> str:
-    """Return in words what matters beyond chance."""
-    named = zip(experiment.trials.values(), differences[name], strict=True)
-    significant = [
-        f"{words} ({each if name == 'reward' else _whole(each)})"
-        for words, each in named
-        if each and abs(each.mean) > each.half
-    ]
-    return "; ".join(significant) or "none"
 
 
 def _results(experiment: ShapingSettings, tables: Tables, differences: Differences, caption: str) -> Table:
@@ -128,23 +110,13 @@ def _results(experiment: ShapingSettings, tables: Tables, differences: Differenc
     return Table(header, lines, caption)
 
 
-def _spread(shaped: NDArray[np.float64], without: NDArray[np.float64], arms: int) -> tuple[str, Verdict]:
-    """Return both standard deviations on an arm, and whether the first is significantly smaller (Pitman and Morgan).
-
-    Runs are pairs; the variances differ where sum and difference of the pairs are correlated.
-    """
-    apart = [values.reshape(arms, -1) for values in (shaped, without)]
-    x, y = ((values - values.mean(axis=1, keepdims=True)).ravel() for values in apart)
-    freedom = len(x) - arms
-    if freedom < 1:
-        return "one run", "open"
-    text = " against ".join(f"{np.sqrt((v * v).sum() / freedom):.2f}" for v in (x, y))
-    less, more = x - y, x + y
-    if freedom < 4 or less.std() == 0 or more.std() == 0:
-        return text, "open"
-    correlation = np.clip(np.corrcoef(less, more)[0, 1], -1 + 1e-12, 1 - 1e-12)
-    # Fisher's transform makes the correlation about normal, with this standard deviation.
-    return text, below(Interval(float(np.arctanh(correlation)), 1.96 / math.sqrt(freedom - 2), freedom))
+def _spread(shaped: Array, without: Array, arms: int) -> tuple[str, Interval]:
+    """Return both standard deviations on an arm in words, and the logarithm of their ratio, over arms."""
+    tables = [values.reshape(arms, -1) for values in (shaped, without)]
+    if tables[0].shape[1] < 2:
+        return "one run", Interval(math.nan, math.inf, 0)
+    x, y = (np.maximum(values.std(axis=1, ddof=1), _SMALLEST) for values in tables)
+    return " against ".join(f"{math.sqrt((v * v).mean()):.2f}" for v in (x, y)), interval(np.log(x / y), arms)
 
 
 def _share(met: NDArray[np.float64]) -> str:

@@ -6,10 +6,6 @@ on the same held-out sequences, so the states are nested. An agent cannot know h
 trained and moved on the arm only without it.
 
     pneumarm experiment state-history --out laboratory
-
-Answer here: three observations, as in the thesis: against one they take a fifth off the error of the angle and three
-fifths off those of the pressures, and agents are better on the arm; no gain by a fourth is shown. The length of steps
-takes some 6 % off the error of the angle, as section 3.3 says and appendix A does not.
 """
 
 from pneumarm.experiments.state_history.histories import StateHistory

@@ -8,11 +8,6 @@ with all three; what still differs from the simulation is the error of the model
 apart.
 
     pneumarm experiment transfer
-
-On arms 1 to 5, four runs each, the agent that does not learn loses 0.4 ± 3.5 of its reward on arrival, where the
-thesis lost more than 15. Of the causes only the error of the model significantly takes something, 3.6 ± 2.1 of a
-greedy agent's reward. Learning on the arm does not help: with 0.10 agents end 22 ± 9 below the one that does not
-learn, with 0.05 by 8 ± 11.
 """
 
 from pneumarm.experiments.transfer.conditions import TransferToTheArm

@@ -7,7 +7,6 @@ import msgspec
 import numpy as np
 
 from pneumarm.experiments.analysis import analysed, filled_words
-from pneumarm.experiments.differences import Interval
 from pneumarm.experiments.experiment import Analysis, TrialRows
 from pneumarm.experiments.means import Array, blocks, difference, mean, over_arms, text, values
 from pneumarm.experiments.moving import SIMULATION
@@ -26,6 +25,7 @@ from pneumarm.experiments.transfer.conditions import (
     WITHOUT_NOISE,
     TransferToTheArm,
 )
+from pneumarm.experiments.verdict import Interval
 from pneumarm.report.page import Picture
 
 _ALL_THREE, _MODEL, _COLD = "noise, lateness and cold together", "error of the model", "cold arm"
@@ -57,11 +57,11 @@ def analysis(experiment: TransferToTheArm, rows: TrialRows) -> Analysis:
         conditions, arms = ", ".join(CONDITIONS[trial] for trial in IDEAL), ", ".join(sorted(set(without)))
         left_out = f"Only a virtual arm can be put into these conditions, {arms} was not: {conditions}."
         words = msgspec.structs.replace(words, summary=(*words.summary, left_out))
-    last = {experiment.trials[t]: over_arms(blocks(rows, "reward", t)[:, :, -1])._asdict() for t in RATES}
+    last = {experiment.trials[t]: over_arms(blocks(rows, "reward", t)[:, :, -1]).figures() for t in RATES}
     on_arm, taken = words.sections
     drawn = {name: one for name, one in causes.items() if one.samples}
     lost = dots(list(drawn), {"lost reward [-]": list(drawn.values())}, taken.figure, zero=True)
-    figures = {"drop": found["drop"]._asdict(), "causes": {name: one._asdict() for name, one in causes.items()}}
+    figures = {"drop": found["drop"].figures(), "causes": {name: one.figures() for name, one in causes.items()}}
     made = analysed(
         experiment,
         rows,
@@ -84,6 +84,7 @@ def transfer_evidence(rows: TrialRows, progress: int) -> dict[str, Any]:
     frozen, slow = (blocks(rows, "reward", trial) for trial in (1, 2))
     return {
         "success": over_arms(np.mean([blocks(rows, "success_rate", t).mean(axis=-1) for t in RATES], axis=0)),
+        "ended": over_arms(_last(slow) - values(rows, EXPLORING + "reward", 2)),
         "warmed": over_arms(_last(frozen) - frozen[:, :, 0]),
         **{
             f"better_{trial}": over_arms(_last(blocks(rows, "reward", trial)) - _last(frozen))

@@ -7,10 +7,6 @@ morning, and all are judged by the same reward, in the simulation with the thesi
 without learning.
 
     pneumarm experiment transferability
-
-Answer here, on five arms: trial 10 loses 3 ± 3 of its reward on the way to the arm, and no other kind of agent
-significantly loses more or less. They differ in what they earn in either place: without shaping 12 less on the arm,
-and without the punishment a third of the movements fail, so that no more is lost by the transfer.
 """
 
 from pneumarm.experiments.transferability.kinds import Transferability

@@ -5,10 +5,6 @@ fitted, an agent trained and moved on the arm each way. Besides, a muscle is inf
 each way and watched every millisecond, which is figure 2.8 measured.
 
     pneumarm experiment valves-closed --out laboratory
-
-Answer here: the simulation can extrapolate: its error is larger in counts with valves left as they are, but smaller
-in parts of what the arm then moves, which accelerates a quarter more. That agents gain by it, in time, switches or
-reward, five arms do not show.
 """
 
 from pneumarm.experiments.valves_closed.inflation import ValvesClosed

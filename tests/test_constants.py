@@ -41,7 +41,7 @@ def test_a_constant_is_replaced_for_a_while() -> None:
 
 def test_worse_is_what_is_surely_worse() -> None:
     usual = {"settled": 0.9, "seconds": 0.4, "rest": 0.1, "overshoot": 0.5, "changes": 8.0, "late": 0.0, "track": 0.4}
-    rows = [{**usual, "rest": 0.1 + 0.001 * n} for n in range(20)]
+    rows = [{**usual, "rest": 0.1 + 0.001 * n} for n in range(40)]
     assert not compared(rows, rows)[0]
     assert compared([{**row, "rest": 1.2 * row["rest"]} for row in rows], rows)[0]
     assert compared([{**row, "settled": 0.8 + 0.001 * n} for n, row in enumerate(rows)], rows)[0]

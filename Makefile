@@ -9,7 +9,7 @@ READY := $(VENV)/.ready
 PYTHON311 ?= python3.11
 LOWEST := .venv-lowest
 
-.PHONY: setup run test test-all lint figures same bench held-out baselines soak mutants walk lowest site clean
+.PHONY: setup run test test-all lint figures same bench held-out constants baselines soak mutants walk lowest site clean
 
 setup: $(READY)
 
@@ -46,6 +46,9 @@ bench: setup
 
 held-out: setup  ## the whole job on the ten held-out arms; takes about ten minutes
 	$(BIN)/python -m benchmarks held_out
+
+constants: setup  ## which constants decide how an arm moves: each at half and at one and a half times its value, into runs/constants; takes nights, a second call goes on
+	$(BIN)/python -m benchmarks constants
 
 baselines: setup  ## the table of baselines on the held-out arms, into runs/baselines; takes hours, a second call goes on
 	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[dev,stable-baselines]'

@@ -15,6 +15,7 @@ LONG = (
     "agents",
     "bound",
     "chosen",
+    "constants",
     "dead_time",
     "faults",
     "few_sensors",

@@ -67,8 +67,15 @@ def test_a_movement_settles_when_it_no_longer_leaves_the_tolerance() -> None:
     assert moved.recorded.time[-1] == pytest.approx(3.0)
     assert moved.results()["air_litres"] is None
     assert set(moved.results()) == {
-        "goal_deg", "time_start", "time_settled", "rest_error_deg", "success", "tries", "switches", "air_litres",
+        "goal_deg", "time_start", "time_settled", "rest_error_deg", "overshoot_deg", "success", "tries", "switches",
+        "air_litres",
     }  # fmt: skip
+
+
+@pytest.mark.parametrize(("hold", "changes"), [(3.0, 0), (1.4, 1), (0.9, 2)])
+def test_valve_changes_at_rest_are_those_of_the_last_second(hold: float, changes: int) -> None:
+    (moved,) = move(Steered(), Towards(), [[600.0]], MoveSettings(hold=hold, tries=1))  # open from 0 to 0.5 s
+    assert moved.changes_at_rest.tolist() == [changes]
 
 
 @pytest.mark.parametrize(("hold", "settles"), [(0.7, False), (0.9, True)])

@@ -98,6 +98,9 @@ def how_it_moves(results: dict[str, Any]) -> Iterator[Table]:
         ("rests off by", f"{found['rest_error_deg']:.2f}°"),
         ("valve changes a second", f"{found['valve_changes_per_second']:.0f}"),
     ]
+    if "overshoot_deg" in found:  # not in results of a version before this
+        rows.append(("half of them overshoot by less than", f"{found['overshoot_deg']:.1f}°"))
+        rows.append(("valve changes in the last second", f"{found['valve_changes_last_second']:.0f} a joint"))
     for one in results["track"]:
         errors = ", ".join(f"{error:.2f}°" for error in one["rms_error_deg"])
         rows.append((f"follows {one['amplitude_deg']:.0f}°, {one['frequency_hz']:g} Hz, off by", errors))

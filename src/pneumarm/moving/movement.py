@@ -103,6 +103,13 @@ class Moved:
         return float(np.linalg.norm(there - self.goal_xy, axis=1).mean())
 
     @property
+    def changes_at_rest(self) -> NDArray[np.int64]:
+        """Valve changes in the last second of the hold, of each joint, shape (joints,)."""
+        commands, late = self.recorded.command[:-1], _last_second(self.recorded.time)[:-1]
+        changed = valve_changes(commands) - valve_changes(commands[~late])
+        return changed.sum(axis=1)
+
+    @property
     def success(self) -> bool:
         """Whether it settled."""
         return self.time_settled is not None
@@ -114,6 +121,7 @@ class Moved:
             "time_start": self.time_start,
             "time_settled": self.time_settled,
             "rest_error_deg": self.rest_error.round(4).tolist(),
+            "overshoot_deg": self.overshoot.round(4).tolist(),
             "success": self.success,
             "tries": self.tries,
             "switches": self.switches,

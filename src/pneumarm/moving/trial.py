@@ -59,8 +59,11 @@ class MoveTrial:
                 "settled": len(settled) / len(self.moved),
                 "settled_interval": [low, high],
                 "median_seconds": float(np.median(seconds)) if seconds else None,
+                "seconds_95": float(np.quantile(seconds, 0.95)) if seconds else None,
+                "overshoot_deg": float(np.median([one.overshoot.max() for one in self.moved])),
                 "rest_error_deg": float(np.mean([one.rest_error.max() for one in self.moved])),
                 "valve_changes_per_second": float(np.mean([one.switches for one in self.moved]) / self.settings.hold),
+                "valve_changes_last_second": float(np.median([one.changes_at_rest.max() for one in self.moved])),
                 "air_litres_per_movement": float(np.mean(air)) if air else None,
             }
         if self.tracked:

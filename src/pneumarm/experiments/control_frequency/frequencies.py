@@ -9,6 +9,7 @@ import msgspec
 
 from pneumarm.experiments.experiment import Axis, Experiment, Figures, LaboratorySettings
 from pneumarm.experiments.there_and_back import (
+    DECISIVE,
     MOVEMENTS,
     TRAINING,
     TRANSITIONS,
@@ -69,6 +70,7 @@ class ControlFrequency(Experiment):
         return {
             "frequencies": list(self.frequencies),
             "transitions": TRANSITIONS,
+            "collect": DECISIVE["collect"],
             "movements": MOVEMENTS,
             "trainings": trainings,
         }

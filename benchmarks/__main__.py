@@ -16,6 +16,7 @@ LONG = (
     "bound",
     "chosen",
     "dead_time",
+    "double_poles",
     "faults",
     "few_sensors",
     "held_out",

@@ -17,6 +17,7 @@ LONG = (
     "chosen",
     "dead_time",
     "double_poles",
+    "evolution",
     "faults",
     "few_sensors",
     "held_out",

@@ -23,8 +23,9 @@ class EvolutionSettings(TaskSettings, SubPopulationSettings):
     episodes: Annotated[int, Meta(ge=1, le=65_536)] = 32
     """Episodes in which the fitness of a network is measured: its mean reward. All networks of a generation have the
     same begin states, goals and noise."""
-    history: bool = True
-    """Whether it sees the observations and commands of earlier steps, as the state says them (thesis eq. 3.5)."""
+    history: bool = False
+    """Whether it sees the observations and commands of earlier steps, too, as the state holds them (thesis eq. 3.5);
+    by default its units have to remember what matters of these."""
     velocity: bool = True
     """Whether it sees velocities."""
     pressures: bool = True

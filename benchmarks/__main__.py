@@ -20,6 +20,7 @@ LONG = (
     "evolution",
     "faults",
     "few_sensors",
+    "guarantee",
     "held_out",
     "holding",
     "live",

@@ -106,10 +106,10 @@ def test_a_step_of_the_network_is_that_of_its_formula() -> None:
 @pytest.mark.parametrize(
     ("hidden_from_it", "names"),
     [
-        ({"history": False}, ["angle[k]", "velocity[k]", "pressure_1[k]", "pressure_2[k]"]),
-        ({"history": False, "velocity": False}, ["angle[k]", "pressure_1[k]", "pressure_2[k]"]),
-        ({"history": False, "velocity": False, "pressures": False}, ["angle[k]"]),
-        ({"velocity": False, "pressures": False}, ["angle[k]", "angle[k-1]", "command_1[k-1]", "command_2[k-1]"]),
+        ({}, ["angle[k]", "velocity[k]", "pressure_1[k]", "pressure_2[k]"]),
+        ({"velocity": False}, ["angle[k]", "pressure_1[k]", "pressure_2[k]"]),
+        ({"velocity": False, "pressures": False}, ["angle[k]"]),
+        ({"history": True, "velocity": False, "pressures": False}, ["angle[k]", "angle[k-1]", "command_1[k-1]", "command_2[k-1]"]),
     ],
 )
 def test_what_networks_see_of_the_state(hidden_from_it: dict[str, bool], names: list[str]) -> None:

@@ -109,7 +109,10 @@ def test_a_step_of_the_network_is_that_of_its_formula() -> None:
         ({}, ["angle[k]", "velocity[k]", "pressure_1[k]", "pressure_2[k]"]),
         ({"velocity": False}, ["angle[k]", "pressure_1[k]", "pressure_2[k]"]),
         ({"velocity": False, "pressures": False}, ["angle[k]"]),
-        ({"history": True, "velocity": False, "pressures": False}, ["angle[k]", "angle[k-1]", "command_1[k-1]", "command_2[k-1]"]),
+        (
+            {"history": True, "velocity": False, "pressures": False},
+            ["angle[k]", "angle[k-1]", "command_1[k-1]", "command_2[k-1]"],
+        ),
     ],
 )
 def test_what_networks_see_of_the_state(hidden_from_it: dict[str, bool], names: list[str]) -> None:

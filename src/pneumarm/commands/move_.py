@@ -35,8 +35,8 @@ def move_(
     Parameters
     ----------
     controller
-        The folder of a run, an agent, a controller from ``pneumarm tune``, or plan:SIM, which plans in a simulation,
-        turn by turn, and learns nothing.
+        The folder of a run, an agent, a controller from ``pneumarm tune``, plan:SIM, which plans in a simulation,
+        turn by turn, or inverse:DB, which goes back from the goals by what a store holds; both learn nothing.
     goals
         20deg (from the middle of the range) or 650 (counts); of several joints 20deg,-5deg; x and y of the hand from
         the first hinge 0.20m,-0.30m, where the arm's spec has its links; - for standard input, one a line, where

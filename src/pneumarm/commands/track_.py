@@ -27,8 +27,8 @@ def track_(
     Parameters
     ----------
     controller
-        The folder of a run, an agent, a controller from ``pneumarm tune``, or plan:SIM, which plans in a simulation,
-        turn by turn, and learns nothing.
+        The folder of a run, an agent, a controller from ``pneumarm tune``, plan:SIM, which plans in a simulation,
+        turn by turn, or inverse:DB, which goes back from the goals by what a store holds; both learn nothing.
     arm
         virtual, virtual:seed=N, serial:PORT, simulation:FILE or python:module:callable.
     reference

@@ -14,12 +14,14 @@ from pneumarm.errors import UnusableInput
 from pneumarm.files import kind_of
 from pneumarm.learning import AnyAgent
 from pneumarm.learning.agents import goals_of
+from pneumarm.learning.inverse.agent import InverseAgent
 from pneumarm.learning.planned.servo import PlannedServo
 from pneumarm.moving import Holding, at_period
 from pneumarm.simulation.simulation import KIND as SIMULATION
 from pneumarm.transitions.goals import Goals
+from pneumarm.transitions.store import Store
 
-_PLAN = "plan:"
+_PLAN, _INVERSE = "plan:", "inverse:"
 
 
 def open_tracking(
@@ -27,8 +29,9 @@ def open_tracking(
 ) -> tuple[TrackingController, ArmSpec, Goals]:
     """Return the controller called ``name`` for ``arm``, the arm's spec, and the goals it knows.
 
-    ``name`` is the file of an agent or of a tuned controller, the folder of a run, whose agent is taken, or
-    ``plan:SIM``; see :func:`tracking_for` for the rest.
+    ``name`` is the file of an agent or of a tuned controller, the folder of a run, whose agent is taken,
+    ``plan:SIM``, or ``inverse:DB``, which fits the inverse simulation to a store; see :func:`tracking_for` for the
+    rest.
 
     Args:
         name: of the controller.
@@ -40,13 +43,16 @@ def open_tracking(
         UnusableInput: there is no such controller, or it is for another arm.
 
     """
+    if name.startswith(_INVERSE):
+        with Store.open(name.removeprefix(_INVERSE)) as store:
+            return tracking_for(InverseAgent.of(store), arm, tolerance)
     path = Path(name.removeprefix(_PLAN))
     if not name.startswith(_PLAN):
         path = agent_file(path)
     if not path.is_file():
         raise UnusableInput(
             f"controller {name!r}: expected the folder of a run, the file of an agent, a file from `pneumarm tune`, "
-            f"or plan:SIM; there is no file {path}"
+            f"plan:SIM or inverse:DB; there is no file {path}"
         )
     if name.startswith(_PLAN):
         return tracking_for(PlannedServo.load(path), arm, tolerance)
@@ -60,7 +66,7 @@ def open_tracking(
 
 
 def tracking_for(
-    made: AnyAgent | PlannedServo | Tuned, arm: Arm, tolerance: float = 1.0
+    made: AnyAgent | InverseAgent | PlannedServo | Tuned, arm: Arm, tolerance: float = 1.0
 ) -> tuple[TrackingController, ArmSpec, Goals]:
     """Return what was trained or tuned as a controller for ``arm``, the arm's spec, and the goals it knows.
 

@@ -27,6 +27,9 @@ from pneumarm.files import kind_of, refuse_code
 from pneumarm.learning.agents import Acts, AnyAgent, LooksAhead, SelfTesting
 from pneumarm.learning.batched.settings import BatchedSettings
 from pneumarm.learning.batched.training import train_batched
+from pneumarm.learning.evolution import ESP
+from pneumarm.learning.evolution.agent import KIND as EVOLVED
+from pneumarm.learning.evolution.agent import EvolvedAgent
 from pneumarm.learning.hierarchy import HIERARCHY
 from pneumarm.learning.hierarchy.agent import KIND as HIERARCHICAL
 from pneumarm.learning.hierarchy.agent import HierarchicalAgent
@@ -66,17 +69,19 @@ METHODS: Mapping[str, Method] = {
     "policy": Method(PolicySettings, train_policy, PolicyAgent.load, place="policy"),
     "batched": Method(BatchedSettings, train_batched, Agent.load, place="batched"),
     "hierarchy": HIERARCHY,
+    "esp": ESP,
     "sarsa": _thesis("sarsa"),
     "q-learning": _thesis("q-learning"),
 }
 """A servo, by default; a policy to reach goals; the thesis' nine networks learned in many arms; the thesis' agents
-under an upper one, which sets subgoals; the thesis' own. A method whose settings are those of another and more comes
-before that."""
+under an upper one, which sets subgoals; an evolved recurrent network; the thesis' own. A method whose settings are
+those of another and more comes before that."""
 _LOADS: Mapping[str, Callable[[Path], AnyAgent]] = {
     SERVO: ServoAgent.load,
     POLICY: PolicyAgent.load,
     ACTION_VALUES: Agent.load,
     HIERARCHICAL: HierarchicalAgent.load,
+    EVOLVED: EvolvedAgent.load,
     IMPORTED: ImportedPolicy.load,
 }
 """By kind of file."""
@@ -151,11 +156,11 @@ class LearnSettings(Settings):
     settle, hold and track name one and the same agent, which does all three (the default); reach one that reaches
     goals as in the thesis, where flying through one slowly enough counts."""
     method: str | None = None
-    """servo, policy, batched, hierarchy, sarsa, q-learning, or MODULE:NAME of your own.
+    """servo, policy, batched, hierarchy, esp, sarsa, q-learning, or MODULE:NAME of your own.
 
     batched: the thesis' networks learned in many arms at once; hierarchy: an upper agent sets subgoals of the thesis'
-    agents; sarsa and q-learning: the thesis'. An installed method has a name too. By default servo, and policy to
-    reach."""
+    agents; esp: an evolved recurrent network; sarsa and q-learning: the thesis'. An installed method has a name too.
+    By default servo, and policy to reach."""
     servo: ServoSettings = field(default_factory=ServoSettings)
     """Settings of the method servo."""
     policy: PolicySettings = field(default_factory=PolicySettings)
@@ -165,7 +170,7 @@ class LearnSettings(Settings):
     thesis: TrainSettings = field(default_factory=TrainSettings)
     """Settings of the methods sarsa and q-learning."""
     own: dict[str, Any] = field(default_factory=dict)
-    """Settings of hierarchy, or of a method of your own, as --own.NAME VALUE."""
+    """Settings of hierarchy or esp, or of a method of your own, as --own.NAME VALUE."""
 
     def _valid(self) -> Valid:
         _ = self.chosen  # it says what is wrong with the method or with settings of one's own

@@ -37,6 +37,11 @@ class NetworkAgent(SimulationAgent):
     def sizes(self) -> tuple[int, ...]:
         """Units of each layer of the policy, inputs first."""
 
+    @property
+    def size(self) -> int:
+        """Number of weights of the policy."""
+        return weight_count(self.sizes)
+
     def weights(self) -> NDArray[np.float32]:
         """Return a copy of the policy's weights."""
         return self.policy.copy()
@@ -71,9 +76,8 @@ class NetworkAgent(SimulationAgent):
             agent = cls(Simulation.of_parts(read["simulation"], arrays), policy, settings)
         except (msgspec.ValidationError, UnusableInput, ValueError, KeyError, TypeError) as error:
             raise UnusableInput(f"{path}: is no usable agent ({error}); train it again") from error
-        size = weight_count(agent.sizes)
-        if policy.shape != (size,) or policy.dtype != np.float32:
+        if policy.shape != (agent.size,) or policy.dtype != np.float32:
             raise UnusableInput(
-                f"{path}: expected {size} policy weights of type float32, got {policy.shape} of {policy.dtype}"
+                f"{path}: expected {agent.size} policy weights of type float32, got {policy.shape} of {policy.dtype}"
             )
         return agent

@@ -44,6 +44,8 @@ from pneumarm.learning.servo.agent import KIND as SERVO
 from pneumarm.learning.servo.agent import ServoAgent, train_servo
 from pneumarm.learning.servo.settings import ServoSettings
 from pneumarm.learning.training import Progress, Training
+from pneumarm.learning.values import VALUES, ValueAgent
+from pneumarm.learning.values.agent import KIND as LEARNED_VALUES
 from pneumarm.settings import Settings, Valid
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.task.acting import test_acting
@@ -66,17 +68,19 @@ METHODS: Mapping[str, Method] = {
     "policy": Method(PolicySettings, train_policy, PolicyAgent.load, place="policy"),
     "batched": Method(BatchedSettings, train_batched, Agent.load, place="batched"),
     "hierarchy": HIERARCHY,
+    **VALUES,
     "sarsa": _thesis("sarsa"),
     "q-learning": _thesis("q-learning"),
 }
 """A servo, by default; a policy to reach goals; the thesis' nine networks learned in many arms; the thesis' agents
-under an upper one, which sets subgoals; the thesis' own. A method whose settings are those of another and more comes
-before that."""
+under an upper one, which sets subgoals; the rules of section 4.2 (:mod:`.values`); the thesis' own. A method whose
+settings are those of another and more comes before that."""
 _LOADS: Mapping[str, Callable[[Path], AnyAgent]] = {
     SERVO: ServoAgent.load,
     POLICY: PolicyAgent.load,
     ACTION_VALUES: Agent.load,
     HIERARCHICAL: HierarchicalAgent.load,
+    LEARNED_VALUES: ValueAgent.load,
     IMPORTED: ImportedPolicy.load,
 }
 """By kind of file."""

@@ -10,7 +10,7 @@ from pneumarm.learning.values.dynamic_programming import Transitions, sweep
 def solved(noted: Transitions, cells: int, discount: float = 1.0, switch: float = 0.0) -> np.ndarray:
     """Return the values (choices, cells) that sweeps end at."""
     values = np.zeros((noted.reward.shape[1], cells), np.float32)
-    workspace = np.zeros((2, *values.shape))
+    workspace = np.zeros((3, *values.shape))
     for _ in range(2000):
         if sweep(noted, discount, switch, values, workspace) < 1e-7:
             break
@@ -73,5 +73,5 @@ def test_the_shortest_way_through_a_grid(problem: Problem, rows: int, columns: i
 def test_a_cell_that_was_never_seen_keeps_its_value() -> None:
     noted = Transitions(np.zeros(1, np.int64), np.full((1, 1), -1), np.array([[7.0]]))
     values = np.array([[0.0, 3.0]], np.float32)
-    assert sweep(noted, 0.9, 0.0, values, np.zeros((2, 1, 2))) == 7.0
+    assert sweep(noted, 0.9, 0.0, values, np.zeros((3, 1, 2))) == 7.0
     assert values.tolist() == [[7.0, 3.0]]

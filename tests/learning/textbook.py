@@ -138,6 +138,7 @@ class Student:
         """Learn from an episode; return its steps and the sum of its rewards."""
         state, total = self.problem.begin, 0.0
         self.x[:] = self.problem.seen(state)
+        self.memory.next_chosen[:] = -1
         _begin(self.learner, self.schedule, self.x, self.memory, self.random)
         for k in range(self.longest):
             state, reward, is_over = self.problem.step(state, int(self.memory.next_chosen[0]))
@@ -154,6 +155,7 @@ class Student:
         greedy = self.learner._replace(policy=POLICIES.index("greedy"), rate=0.0)
         while len(states) <= self.longest:
             self.x[:] = self.problem.seen(state)
+            self.memory.next_chosen[:] = -1
             _begin(greedy, self.schedule, self.x, self.memory, self.random)
             state, _, is_over = self.problem.step(state, int(self.memory.next_chosen[0]))
             states.append(state)

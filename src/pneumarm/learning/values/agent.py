@@ -143,6 +143,7 @@ class ValueActor:
         """Begin an episode in the scaled ``state`` (state_size,) towards ``goal`` (joints,) [counts]."""
         goal = np.asarray(goal, np.float64).reshape(self._agent.window.joints)
         self._x[self._layout.goal : self._layout.one] = scaled_goal(goal, self._agent.scaling)
+        self._memory.next_chosen[:] = -1
         self.follow(state)
 
     def act(self) -> NDArray[np.int64]:
@@ -159,7 +160,7 @@ class ValueActor:
         return found
 
     def follow(self, next_state: ArrayLike) -> None:
-        """Go on in ``next_state`` without learning, as if an episode began there."""
+        """Go on in ``next_state``, to which the actions of :meth:`act` led, without learning from it."""
         self._x[: self._layout.command] = self._checked(next_state)
         begin_acting(self._learner, self._schedule, self._x, self._memory, self._random)
 

@@ -44,9 +44,9 @@ class PlanSettings(ValueSettings):
     """Two would agree."""
     states: PositiveInt = 100_000
     """States noted in a round."""
-    rounds: PositiveInt = 4
+    rounds: PositiveInt = 6
     """How often arms move and values are found."""
-    random_share: Share = 0.3
+    random_share: Share = 0.1
     """Share of the actions that are random while states are noted; in the first round all are."""
     tolerance: PositiveFloat = 0.01
     """Largest change of a value with which a round ends, in units of reward."""
@@ -75,20 +75,23 @@ def transitions(states: int, choices: int) -> Transitions:
 
 
 @kernel
-def sweep(noted, discount, switch, values, best):  # type: ignore[no-untyped-def]
+def sweep(noted, discount, switch, values, workspace):  # type: ignore[no-untyped-def]
     """Update all ``values`` (choices, cells) by :class:`Transitions`; return the largest change.
 
-    The value of a cell that was never noted stays as it is. ``best`` (2, choices, cells) is workspace.
+    The value of a cell that was never noted stays as it is. ``workspace`` has the shape (3, choices, cells).
     """
-    sums, counts = best
+    sums, counts, ahead = workspace
     sums[:], counts[:] = 0.0, 0.0
     choices = values.shape[0]
+    for cell in range(values.shape[1]):
+        highest = values[greedy(values[:, cell]), cell] + switch
+        for action in range(choices):
+            ahead[action, cell] = max(highest, values[action, cell])
     for s in range(noted.cell.shape[0]):
         for action in range(choices):
             next_cell, target = noted.next_cell[s, action], noted.reward[s, action]
             if next_cell >= 0:
-                highest = values[greedy(values[:, next_cell]), next_cell] + switch
-                target += discount * max(highest, values[action, next_cell])
+                target += discount * ahead[action, next_cell]
             sums[action, noted.cell[s]] += target
             counts[action, noted.cell[s]] += 1.0
     largest = 0.0

@@ -121,7 +121,8 @@ def all_values(learner, function, agent, before, values):  # type: ignore[no-unt
 def weigh(learner, agent, x, before, z, values):  # type: ignore[no-untyped-def]
     """Set ``values`` (choices,) to what ``agent`` prefers in the state ``x``, the actions ``before`` led to it."""
     if learner.rule == TD:
-        foresee_values(learner, agent, x, before, z, values)
+        about = learner.model, learner.variables, learner.values, learner.discount
+        foresee_values(about, agent, x, before, z, values)
         for action in range(values.shape[0]):
             if not learner.possible[action]:
                 values[action] = np.float32(NEVER)
@@ -150,15 +151,21 @@ def decide(learner, schedule, x, memory, random):  # type: ignore[no-untyped-def
             memory.next_values[agent], memory.cut[agent] = look_ahead_sarsa(values, chosen)
 
 
-@part(entry=True)
-def begin_acting(learner, schedule, x, memory, random):  # type: ignore[no-untyped-def]
-    """Begin an episode in the state and goal ``x``: choose its first actions; learn from one that was cut off."""
+@part
+def begin_learning(learner, memory):  # type: ignore[no-untyped-def]
+    """Begin an episode after ``memory.next_chosen``, -1 for an arm at rest; learn from one that was cut off."""
     end_episode(learner, memory)
     for agent in range(memory.chosen.shape[0]):
-        memory.chosen[agent] = -1
+        memory.chosen[agent] = memory.next_chosen[agent]
         if learner.rate > 0.0:
             forget_traces(learner.values, agent)
             forget_traces(learner.actor, agent)
+
+
+@kernel
+def begin_acting(learner, schedule, x, memory, random):  # type: ignore[no-untyped-def]
+    """Begin an episode in the state and goal ``x``, see :func:`begin_learning`: choose its first actions."""
+    begin_learning(learner, memory)
     decide(learner, schedule, x, memory, random)
 
 

@@ -2,46 +2,45 @@
 
 import numpy as np
 
-from pneumarm.kernels import borrowed, kernel, part
+from pneumarm.kernels import borrowed, kernel
 from pneumarm.learning.online.exploration import greedy
-from pneumarm.learning.values.learner import begin_acting, decide, end_episode, learn, remember, weigh
+from pneumarm.learning.values.learner import begin_learning, decide, end_episode, learn, remember, weigh
 from pneumarm.task.environment import begin_episode, take
 from pneumarm.task.noting import goes_on, note_action, note_begin, note_end
 from pneumarm.task.reward import paid
 
 
-@part
-def train_episode(environment, learner, schedule, episode, memory):  # type: ignore[no-untyped-def]
-    """Run one episode, learning; return actions taken and whether the goal was reached."""
-    x, random = episode.state.x, episode.state.random
-    begin_episode(environment, episode, schedule.deviation, random)
-    begin_acting(learner, schedule, x, memory, random)
-    for k in range(environment.task.cutoff):
-        remember(memory, x)
-        is_reached = take(environment, episode, memory.next_chosen)
-        if not is_reached:
-            decide(learner, schedule, x, memory, random)
-        for joint in range(episode.goal.shape[0]):
-            memory.paid[joint] = paid(environment.task.reward, is_reached, episode.switched[joint])
-        learn(learner, schedule, memory, is_reached)
-        if is_reached:
-            return k + 1, True
-    end_episode(learner, memory)
-    return environment.task.cutoff, False
-
-
 @kernel
 def train_episodes(environment, learner, schedule, episode, memory, count, performance):  # type: ignore[no-untyped-def]
-    """Run at most ``count`` episodes; return the performance (thesis eq. 4.14) after them, actions, and episodes."""
+    """Run at most ``count`` episodes; return the performance (thesis eq. 4.14) after them, actions, and episodes.
+
+    What is long to compile stands here once: an episode begins, and goes on, with a choice.
+    """
     environment, learner, episode, memory = borrowed((environment, learner, episode, memory))
-    steps = 0
-    for e in range(count):
-        actions, success = train_episode(environment, learner, schedule, episode, memory)
-        steps += actions
-        performance += schedule.performance_rate * ((1.0 if success else 0.0) - performance)
+    x, random, steps, episodes = episode.state.x, episode.state.random, 0, 0
+    for _ in range(count):
+        begin_episode(environment, episode, schedule.deviation, random)
+        memory.next_chosen[:] = -1
+        begin_learning(learner, memory)
+        is_reached, taken = False, 0
+        while True:
+            if not is_reached:
+                decide(learner, schedule, x, memory, random)
+            if taken > 0:
+                learn(learner, schedule, memory, is_reached)
+            if is_reached or taken == environment.task.cutoff:
+                break
+            remember(memory, x)
+            is_reached = take(environment, episode, memory.next_chosen)
+            for joint in range(episode.goal.shape[0]):
+                memory.paid[joint] = paid(environment.task.reward, is_reached, episode.switched[joint])
+            taken += 1
+        steps, episodes = steps + taken, episodes + 1
+        performance += schedule.performance_rate * ((1.0 if is_reached else 0.0) - performance)
         if performance >= schedule.enough:
-            return performance, steps, e + 1
-    return performance, steps, count
+            break
+    end_episode(learner, memory)
+    return performance, steps, episodes
 
 
 @kernel

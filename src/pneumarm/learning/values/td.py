@@ -84,15 +84,18 @@ def foresee(model, x, before, joint, action):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def foresee_values(learner, joint, x, before, z, values):  # type: ignore[no-untyped-def]
-    """Set ``values`` (choices,) to r + gamma V(s') of each action in the state ``x``; ``z`` is workspace."""
-    model, function = learner.model, learner.values
+def foresee_values(about, joint, x, before, z, values):  # type: ignore[no-untyped-def]
+    """Set ``values`` (choices,) to r + gamma V(s') of each action in the state ``x``; ``z`` is workspace.
+
+    ``about`` are the model, what is seen of its states, the function V, and gamma.
+    """
+    model, variables, function, discount = about
     for action in range(values.shape[0]):
         is_reached = foresee(model, x, before, joint, action)
         reward = paid(model.environment.task.reward, is_reached, model.episode.switched[joint])
         next_value = 0.0
         if not is_reached:
-            see(learner.variables, joint, model.episode.state.x, z)
+            see(variables, joint, model.episode.state.x, z)
             look(function, joint, z)
             next_value = value(function, joint, row_of(function, action))
-        values[action] = np.float32(td_target(reward, learner.discount, next_value, is_reached))
+        values[action] = np.float32(td_target(reward, discount, next_value, is_reached))

@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -41,6 +42,7 @@ def train_values(
 
     Training of one ends as that of the thesis' agents does, see :func:`~.online.training.train_online`.
     """
+    settings = replace(settings)  # defaults that msgspec left out are in it now, and so will be in the file
     env = environment(simulation, begin_states, settings)
 
     def make(number: int) -> Learner[ValueAgent]:
@@ -159,7 +161,7 @@ class Planner(Learner[ValueAgent]):
         settings = self._settings
         values = learner_of(self._simulation, settings, self._weights).values.weights[joint]
         noted = part_of(self._noted[joint], 0, count)
-        workspace, change, made = np.zeros((2, *values.shape)), np.inf, 0
+        workspace, change, made = np.zeros((3, *values.shape)), np.inf, 0
         while made < most and change > settings.tolerance:
             change = float(sweep(noted, float(settings.discount), float(settings.reward.switch), values, workspace))
             made += 1

@@ -38,6 +38,7 @@ RULES: dict[Rule, int] = {
 NETWORKS = {"network", "networks"}
 _CELLS = {
     "table": {"error": 21, "velocity": 9, "pressure_1": 6, "pressure_2": 6, "angle": 5},
+    "dynamic-programming": {"error": 21, "velocity": 9, "pressure_1": 10, "pressure_2": 10, "angle": 8},
     "tiles": {"error": 10, "velocity": 6, "pressure_1": 4, "pressure_2": 4, "angle": 4},
     "kanerva": {"error": 20, "velocity": 12, "pressure_1": 8, "pressure_2": 8, "angle": 8},
 }
@@ -45,7 +46,7 @@ _CELLS = {
 
 def coding_of(settings: ValueSettings) -> Coding:
     """Return how ``settings`` have states coded."""
-    default = _CELLS.get(settings.approximator, {})
+    default = _CELLS.get(settings.rule, _CELLS.get(settings.approximator, {}))
     cells = settings.cells or tuple(default.get(name, 1) for name in settings.variables)
     match settings.approximator:
         case "table":

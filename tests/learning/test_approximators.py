@@ -6,25 +6,23 @@ import numpy as np
 import pytest
 from textbook import Student, function, mountain_car, random_walk
 
-from pneumarm.learning.values.approximators import (
-    Coding,
+from pneumarm.learning.values.approximators.coding import Coding, spread_evenly
+from pneumarm.learning.values.approximators.function import (
+    ValueFunction,
     add_trace,
-    draw_weights,
     follow,
     forget_traces,
-    kanerva,
     look,
-    network,
-    radial,
-    table,
-    tiles,
     update,
     value,
     value_function,
+    write_features,
 )
-from pneumarm.learning.values.approximators.coding import spread_evenly
-from pneumarm.learning.values.approximators.function import ValueFunction, write_features
-from pneumarm.learning.values.approximators.network import network_shape
+from pneumarm.learning.values.approximators.kanerva import kanerva
+from pneumarm.learning.values.approximators.network import draw_weights, network, network_shape
+from pneumarm.learning.values.approximators.radial import radial
+from pneumarm.learning.values.approximators.table import table
+from pneumarm.learning.values.approximators.tiles import tiles
 from pneumarm.learning.values.learner import SARSA
 
 LINEAR: dict[str, Callable[[], Coding]] = {

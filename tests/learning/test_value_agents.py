@@ -159,7 +159,7 @@ def test_what_a_switch_costs_is_known(simulation: Simulation, begin: BeginStates
     first, taken = actor.values()[0], int(actor.act()[0])
     actor.follow(begin.states[5])
     cost = np.where(np.arange(9) == taken, 0.0, -8.0)
-    np.testing.assert_allclose(actor._memory.values, first + cost, rtol=1e-6)
+    np.testing.assert_allclose(actor._workspace.values, first + cost, rtol=1e-6)
 
 
 def test_td_looks_ahead_through_the_simulation(simulation: Simulation, begin: BeginStates) -> None:

@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 from textbook import CLIFF, WINDY, Student, function, mountain_car, random_walk
 
-from pneumarm.learning.values.approximators import table, tiles, update
+from pneumarm.learning.values.approximators.function import update
+from pneumarm.learning.values.approximators.table import table
+from pneumarm.learning.values.approximators.tiles import tiles
 from pneumarm.learning.values.learner import ACTOR_CRITIC, MONTE_CARLO, Q_LEARNING, SARSA
 from pneumarm.learning.values.monte_carlo import learn_path, path
 

@@ -9,7 +9,9 @@ from synthetic_arm import synthetic_simulation
 
 from pneumarm.kernels import direct
 from pneumarm.learning.online.loop import Schedule
-from pneumarm.learning.values.approximators import Coding, ValueFunction, table, value_function
+from pneumarm.learning.values.approximators.coding import Coding
+from pneumarm.learning.values.approximators.function import ValueFunction, value_function
+from pneumarm.learning.values.approximators.table import table
 from pneumarm.learning.values.learner import ACTOR_CRITIC, TD, ValueLearner, begin_acting, learn_and_act, value_memory
 from pneumarm.learning.values.policies import POLICIES, PolicyName
 from pneumarm.learning.values.td import model_of
@@ -138,10 +140,10 @@ class Student:
         """Learn from an episode; return its steps and the sum of its rewards."""
         state, total = self.problem.begin, 0.0
         self.x[:] = self.problem.seen(state)
-        self.memory.next_chosen[:] = -1
+        self.memory.next_actions[:] = -1
         _begin(self.learner, self.schedule, self.x, self.memory, self.random)
         for k in range(self.longest):
-            state, reward, is_over = self.problem.step(state, int(self.memory.next_chosen[0]))
+            state, reward, is_over = self.problem.step(state, int(self.memory.next_actions[0]))
             total += reward
             seen = np.array([reward]), np.array(self.problem.seen(state), np.float32)
             _learn(self.learner, self.schedule, self.x, self.memory, self.random, seen, is_over)
@@ -155,9 +157,9 @@ class Student:
         greedy = self.learner._replace(policy=POLICIES.index("greedy"), rate=0.0)
         while len(states) <= self.longest:
             self.x[:] = self.problem.seen(state)
-            self.memory.next_chosen[:] = -1
+            self.memory.next_actions[:] = -1
             _begin(greedy, self.schedule, self.x, self.memory, self.random)
-            state, _, is_over = self.problem.step(state, int(self.memory.next_chosen[0]))
+            state, _, is_over = self.problem.step(state, int(self.memory.next_actions[0]))
             states.append(state)
             if is_over:
                 break

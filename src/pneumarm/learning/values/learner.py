@@ -76,7 +76,7 @@ class ValueMemory(NamedTuple):
     """The actions that led to the state before, -1 for none, shape (agents,)."""
     chosen: NDArray[np.int64]
     """The actions taken there, same shape."""
-    next_chosen: NDArray[np.int64]
+    next_actions: NDArray[np.int64]
     """The actions chosen in the state after, same shape."""
     next_values: NDArray[np.float64]
     """What the targets look ahead to, same shape."""
@@ -99,7 +99,7 @@ def value_memory(learner: ValueLearner, inputs: int, steps: int) -> ValueMemory:
         odds=np.zeros(choices, np.float32),
         last=np.full(agents, -1, np.int64),
         chosen=np.full(agents, -1, np.int64),
-        next_chosen=np.full(agents, -1, np.int64),
+        next_actions=np.full(agents, -1, np.int64),
         next_values=np.zeros(agents),
         cut=np.zeros(agents, np.bool_),
         paid=np.zeros(agents),
@@ -140,7 +140,7 @@ def decide(learner, schedule, x, memory, random):  # type: ignore[no-untyped-def
     for agent in range(memory.chosen.shape[0]):
         weigh(learner, agent, x, memory.chosen, z, values)
         chosen = act_by(learner.policy, values, schedule.epsilon, schedule.temperature, memory.odds, random)
-        memory.next_chosen[agent], memory.cut[agent] = chosen, False
+        memory.next_actions[agent], memory.cut[agent] = chosen, False
         if learner.rule == TD or learner.rule == ACTOR_CRITIC:
             see(learner.variables, agent, x, z)
             look(learner.values, agent, z)
@@ -153,10 +153,10 @@ def decide(learner, schedule, x, memory, random):  # type: ignore[no-untyped-def
 
 @part
 def begin_learning(learner, memory):  # type: ignore[no-untyped-def]
-    """Begin an episode after ``memory.next_chosen``, -1 for an arm at rest; learn from one that was cut off."""
+    """Begin an episode after ``memory.next_actions``, -1 for an arm at rest; learn from one that was cut off."""
     end_episode(learner, memory)
     for agent in range(memory.chosen.shape[0]):
-        memory.chosen[agent] = memory.next_chosen[agent]
+        memory.chosen[agent] = memory.next_actions[agent]
         if learner.rate > 0.0:
             forget_traces(learner.values, agent)
             forget_traces(learner.actor, agent)
@@ -183,7 +183,7 @@ def remember(memory, x):  # type: ignore[no-untyped-def]
         memory.before[i] = x[i]
     for agent in range(memory.chosen.shape[0]):
         memory.last[agent] = memory.chosen[agent]
-        memory.chosen[agent] = memory.next_chosen[agent]
+        memory.chosen[agent] = memory.next_actions[agent]
 
 
 @part
@@ -221,11 +221,11 @@ def learn(learner, schedule, memory, is_over):  # type: ignore[no-untyped-def]
 
 @kernel
 def learn_and_act(learner, schedule, x, memory, random, seen, is_over):  # type: ignore[no-untyped-def]
-    """Go on in the state vector ``seen[1]``, which becomes ``x``, having been paid ``seen[0]`` (agents,)."""
-    paid, next_x = seen
+    """Go on in the state that ``seen`` ends in, having been paid what it begins with (agents,)."""
+    paid, next_state = seen
     remember(memory, x)
-    for i in range(next_x.shape[0]):
-        x[i] = next_x[i]
+    for i in range(next_state.shape[0]):
+        x[i] = next_state[i]
     if not is_over:
         decide(learner, schedule, x, memory, random)
     if learner.rate > 0.0:

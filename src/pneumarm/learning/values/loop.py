@@ -20,7 +20,7 @@ def train_episodes(environment, learner, schedule, episode, memory, count, perfo
     x, random, steps, episodes = episode.state.x, episode.state.random, 0, 0
     for _ in range(count):
         begin_episode(environment, episode, schedule.deviation, random)
-        memory.next_chosen[:] = -1
+        memory.next_actions[:] = -1
         begin_learning(learner, memory)
         is_reached, taken = False, 0
         while True:
@@ -31,7 +31,7 @@ def train_episodes(environment, learner, schedule, episode, memory, count, perfo
             if is_reached or taken == environment.task.cutoff:
                 break
             remember(memory, x)
-            is_reached = take(environment, episode, memory.next_chosen)
+            is_reached = take(environment, episode, memory.next_actions)
             for joint in range(episode.goal.shape[0]):
                 memory.paid[joint] = paid(environment.task.reward, is_reached, episode.switched[joint])
             taken += 1

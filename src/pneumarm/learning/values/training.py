@@ -61,7 +61,26 @@ def train_values(
     )
 
 
-class ValueTrainee(ShapedLearner[ValueAgent, ValueSettings]):
+class Tested:
+    """How both kinds of learners are tested, and what comes of them."""
+
+    _env: Environment
+    _simulation: Simulation
+    _settings: Any
+    _seed: int
+    _weights: NDArray[np.float32]
+
+    def validate(self, episodes: int) -> Movements:
+        """Return greedy movements."""
+        learner = learner_of(self._simulation, self._settings, self._weights.copy(), 0.0)
+        return run_test(self._env, learner, episodes, (self._seed, _VALIDATION))
+
+    def agent(self) -> ValueAgent:
+        """Return the agent as it is now."""
+        return ValueAgent(self._simulation, self._weights.copy(), self._settings)
+
+
+class ValueTrainee(Tested, ShapedLearner[ValueAgent, ValueSettings]):
     """Values of any rule, learned in episodes that begin ever farther from their goals."""
 
     def _drawn(self, random: np.random.Generator) -> NDArray[np.float32]:
@@ -75,17 +94,8 @@ class ValueTrainee(ShapedLearner[ValueAgent, ValueSettings]):
         )
         return found
 
-    def validate(self, episodes: int) -> Movements:
-        """Return greedy movements."""
-        learner = learner_of(self._simulation, self._settings, self._weights.copy(), 0.0)
-        return run_test(self._env, learner, episodes, (self._seed, _VALIDATION))
 
-    def agent(self) -> ValueAgent:
-        """Return the agent as it is now."""
-        return ValueAgent(self._simulation, self._weights.copy(), self._settings)
-
-
-class Planner(Learner[ValueAgent]):
+class Planner(Tested, Learner[ValueAgent]):
     """Dynamic programming, round after round."""
 
     columns = ("episodes", "states", "cells", "sweeps", "change")
@@ -166,12 +176,3 @@ class Planner(Learner[ValueAgent]):
             change = float(sweep(noted, float(settings.discount), float(settings.reward.switch), values, workspace))
             made += 1
         return made, change
-
-    def validate(self, episodes: int) -> Movements:
-        """Return greedy movements."""
-        learner = learner_of(self._simulation, self._settings, self._weights.copy(), 0.0)
-        return run_test(self._env, learner, episodes, (self._seed, _VALIDATION))
-
-    def agent(self) -> ValueAgent:
-        """Return the agent as it is now."""
-        return ValueAgent(self._simulation, self._weights.copy(), self._settings)

@@ -6,18 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm.valves import ACTIONS, possible_actions
-from pneumarm.learning.values.approximators import (
-    Coding,
-    ValueFunction,
-    draw_weights,
-    function_shape,
-    kanerva,
-    network,
-    radial,
-    table,
-    tiles,
-    value_function,
-)
+from pneumarm.learning.values.approximators.coding import Coding
+from pneumarm.learning.values.approximators.function import ValueFunction, function_shape, value_function
+from pneumarm.learning.values.approximators.kanerva import kanerva
+from pneumarm.learning.values.approximators.network import draw_weights, network
+from pneumarm.learning.values.approximators.radial import radial
+from pneumarm.learning.values.approximators.table import table
+from pneumarm.learning.values.approximators.tiles import tiles
 from pneumarm.learning.values.learner import ACTOR_CRITIC, MONTE_CARLO, Q_LEARNING, SARSA, TD, ValueLearner
 from pneumarm.learning.values.policies import POLICIES
 from pneumarm.learning.values.settings import Rule, ValueSettings

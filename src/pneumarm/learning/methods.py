@@ -155,11 +155,12 @@ class LearnSettings(Settings):
     settle, hold and track name one and the same agent, which does all three (the default); reach one that reaches
     goals as in the thesis, where flying through one slowly enough counts."""
     method: str | None = None
-    """servo, policy, batched, hierarchy, sarsa, q-learning, or MODULE:NAME of your own.
+    """servo, policy, batched, hierarchy, sarsa, q-learning, a rule of section 4.2, or MODULE:NAME of your own.
 
     batched: the thesis' networks learned in many arms at once; hierarchy: an upper agent sets subgoals of the thesis'
-    agents; sarsa and q-learning: the thesis'. An installed method has a name too. By default servo, and policy to
-    reach."""
+    agents; sarsa and q-learning: the thesis'; td, monte-carlo, sarsa-lambda, q-lambda, actor-critic and
+    dynamic-programming: values on any approximator, by any policy. An installed method has a name too. By default
+    servo, and policy to reach."""
     servo: ServoSettings = field(default_factory=ServoSettings)
     """Settings of the method servo."""
     policy: PolicySettings = field(default_factory=PolicySettings)
@@ -169,7 +170,7 @@ class LearnSettings(Settings):
     thesis: TrainSettings = field(default_factory=TrainSettings)
     """Settings of the methods sarsa and q-learning."""
     own: dict[str, Any] = field(default_factory=dict)
-    """Settings of hierarchy, or of a method of your own, as --own.NAME VALUE."""
+    """Settings of hierarchy, of a rule of section 4.2, or of a method of your own, as --own.NAME VALUE."""
 
     def _valid(self) -> Valid:
         _ = self.chosen  # it says what is wrong with the method or with settings of one's own

@@ -55,7 +55,7 @@ def test_every_rule_learns_to_reach_goals(name: str, simulation: Simulation, beg
     assert test(untrained, simulation, begin, 500).success.mean() < 0.5
 
 
-@pytest.mark.parametrize("approximator", ["table", "radial", "kanerva", "network", "networks"])
+@pytest.mark.parametrize("approximator", ["table", "tiles", "kanerva", "network", "networks"])
 def test_on_every_approximator(approximator: Approximator, simulation: Simulation, begin: BeginStates) -> None:
     is_network = approximator.startswith("network")
     chosen = {"traces": "accumulating", "learning_rate": 0.05, "trace_decay": 0.3} if is_network else {}
@@ -98,7 +98,7 @@ def test_the_same_seed_gives_the_same_bits(simulation: Simulation, begin: BeginS
 @pytest.mark.parametrize(
     ("name", "chosen"),
     [
-        ("sarsa-lambda", {}),
+        ("sarsa-lambda", {"approximator": "tiles"}),
         ("q-lambda", {"approximator": "networks", "traces": "accumulating"}),
         ("monte-carlo", {"approximator": "table", "step_size": "1/k"}),
         ("td", {"approximator": "kanerva"}),
@@ -266,8 +266,8 @@ def test_what_does_not_fit_together_is_said(chosen: dict, words: str) -> None:
 
 
 def test_options_of_the_command_line() -> None:
-    learn = LearnSettings(method="q-lambda", own={"approximator": "radial", "centres": "80", "policy": "boltzmann"})
-    assert learn.chosen == VALUES["q-lambda"].settings(approximator="radial", centres=80, policy="boltzmann")
+    learn = LearnSettings(method="q-lambda", own={"approximator": "kanerva", "centres": "80", "policy": "boltzmann"})
+    assert learn.chosen == VALUES["q-lambda"].settings(approximator="kanerva", centres=80, policy="boltzmann")
     with pytest.raises(UnusableInput, match="no setting approximate"):
         LearnSettings(method="q-lambda", own={"approximate": "radial"})
     with pytest.raises(UnusableInput, match="rule"):

@@ -1,6 +1,6 @@
 """The values that thesis section 4.2 describes, beside those that it tried: rules, approximators and policies.
 
-pneumarm train arm.sim arm.db --out arm.agent --method q-lambda --own.approximator radial --own.policy boltzmann
+pneumarm train arm.sim arm.db --out arm.agent --method q-lambda --own.approximator tiles --own.policy boltzmann
 """
 
 from pneumarm.learning.method import Method

@@ -16,7 +16,7 @@ from typing import Annotated, Literal
 from pneumarm.kernels import kernel
 from pneumarm.learning.online.settings import FirstExploration, Shaping
 from pneumarm.learning.values.approximators.function import add_trace, follow
-from pneumarm.learning.values.settings import ValueSettings
+from pneumarm.learning.values.settings import Approximator, ValueSettings
 from pneumarm.settings import PythonOnly
 
 
@@ -30,6 +30,8 @@ class ActorCriticSettings(ValueSettings):
 
     rule: Annotated[Literal["actor-critic"], PythonOnly] = "actor-critic"
     """Its name."""
+    approximator: Approximator = "tiles"
+    """What holds preferences and values; all preferences have traces, so one with few active features."""
     policy: Annotated[Literal["boltzmann"], PythonOnly] = "boltzmann"
     """The actor is one."""
     traces: Annotated[Literal["accumulating"], PythonOnly] = "accumulating"

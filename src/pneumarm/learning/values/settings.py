@@ -20,7 +20,7 @@ class ValueSettings(TrainSettings):
 
     rule: Annotated[Rule, PythonOnly] = "sarsa-lambda"
     """Which values are learned, and what they are moved towards; set by the name of the method."""
-    approximator: Approximator = "tiles"
+    approximator: Approximator = "radial"
     """What holds the values: table, tiles, radial basis functions, Kanerva coding, one network for all actions, or
     networks, one an action (thesis: networks)."""
     policy: PolicyName = "max-boltzmann"

@@ -21,7 +21,7 @@ from pneumarm.kernels import kernel, part
 from pneumarm.learning.online.values import td_target
 from pneumarm.learning.values.approximators.coding import NETWORK
 from pneumarm.learning.values.approximators.function import look, value
-from pneumarm.learning.values.settings import ValueSettings
+from pneumarm.learning.values.settings import Approximator, ValueSettings
 from pneumarm.learning.values.view import see
 from pneumarm.random import random_state
 from pneumarm.settings import PythonOnly, Share
@@ -39,6 +39,8 @@ class TdSettings(ValueSettings):
 
     rule: Annotated[Literal["td"], PythonOnly] = "td"
     """Its name."""
+    approximator: Approximator = "tiles"
+    """What holds the values; it is asked for those of nine states in every step, so a fast one."""
     trace_decay: Share = 0.0
     """lambda of the eligibility traces (thesis: 0)."""
 

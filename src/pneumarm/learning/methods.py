@@ -47,6 +47,8 @@ from pneumarm.learning.servo.agent import KIND as SERVO
 from pneumarm.learning.servo.agent import ServoAgent, train_servo
 from pneumarm.learning.servo.settings import ServoSettings
 from pneumarm.learning.training import Progress, Training
+from pneumarm.learning.values import VALUES, ValueAgent
+from pneumarm.learning.values.agent import KIND as LEARNED_VALUES
 from pneumarm.settings import Settings, Valid
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.task.acting import test_acting
@@ -70,18 +72,20 @@ METHODS: Mapping[str, Method] = {
     "batched": Method(BatchedSettings, train_batched, Agent.load, place="batched"),
     "hierarchy": HIERARCHY,
     "esp": ESP,
+    **VALUES,
     "sarsa": _thesis("sarsa"),
     "q-learning": _thesis("q-learning"),
 }
 """A servo, by default; a policy to reach goals; the thesis' nine networks learned in many arms; the thesis' agents
-under an upper one, which sets subgoals; an evolved recurrent network; the thesis' own. A method whose settings are
-those of another and more comes before that."""
+under an upper one, which sets subgoals; an evolved recurrent network; the rules of section 4.2 (:mod:`.values`); the
+thesis' own. A method whose settings are those of another and more comes before that."""
 _LOADS: Mapping[str, Callable[[Path], AnyAgent]] = {
     SERVO: ServoAgent.load,
     POLICY: PolicyAgent.load,
     ACTION_VALUES: Agent.load,
     HIERARCHICAL: HierarchicalAgent.load,
     EVOLVED: EvolvedAgent.load,
+    LEARNED_VALUES: ValueAgent.load,
     IMPORTED: ImportedPolicy.load,
 }
 """By kind of file."""
@@ -156,11 +160,12 @@ class LearnSettings(Settings):
     settle, hold and track name one and the same agent, which does all three (the default); reach one that reaches
     goals as in the thesis, where flying through one slowly enough counts."""
     method: str | None = None
-    """servo, policy, batched, hierarchy, esp, sarsa, q-learning, or MODULE:NAME of your own.
+    """servo, policy, batched, hierarchy, esp, sarsa, q-learning, a rule of section 4.2, or MODULE:NAME of your own.
 
     batched: the thesis' networks learned in many arms at once; hierarchy: an upper agent sets subgoals of the thesis'
-    agents; esp: an evolved recurrent network; sarsa and q-learning: the thesis'. An installed method has a name too.
-    By default servo, and policy to reach."""
+    agents; esp: an evolved recurrent network; sarsa and q-learning: the thesis'; td, monte-carlo, sarsa-lambda,
+    q-lambda, actor-critic and dynamic-programming: values on any approximator, by any policy. An installed method has
+    a name too. By default servo, and policy to reach."""
     servo: ServoSettings = field(default_factory=ServoSettings)
     """Settings of the method servo."""
     policy: PolicySettings = field(default_factory=PolicySettings)
@@ -170,7 +175,7 @@ class LearnSettings(Settings):
     thesis: TrainSettings = field(default_factory=TrainSettings)
     """Settings of the methods sarsa and q-learning."""
     own: dict[str, Any] = field(default_factory=dict)
-    """Settings of hierarchy or esp, or of a method of your own, as --own.NAME VALUE."""
+    """Settings of hierarchy, of esp, of a rule of section 4.2, or of a method of your own, as --own.NAME VALUE."""
 
     def _valid(self) -> Valid:
         _ = self.chosen  # it says what is wrong with the method or with settings of one's own
@@ -202,7 +207,8 @@ class LearnSettings(Settings):
                 f"method {self.method}: has no setting {', '.join(unknown)}; it has {', '.join(known)}"
             )
         try:
-            return msgspec.convert({**self.own, **method.fixed}, method.settings, strict=False)
+            found = msgspec.convert({**self.own, **method.fixed}, method.settings, strict=False)
+            return replace(found)  # msgspec leaves defaults in the class, where vars() does not see them
         except msgspec.ValidationError as error:
             raise UnusableInput(f"method {self.method}: {error}") from error
 

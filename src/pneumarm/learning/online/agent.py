@@ -178,13 +178,22 @@ class OnlineLearner:
         chosen = exploration or Exploration(0.0, 1.0)
         self.schedule = Schedule(np.inf, float(chosen.epsilon), float(chosen.temperature), 0.0)
         """How it explores from now on."""
-        self._learner = learner(agent.weights(), agent.settings, learning_rate)
         self._random = random_state(seed)
-        joints = agent.window.joints
         self._layout = layout_of(agent.window)
         self._x = np.zeros(self._layout.size, np.float32)
         self._x[self._layout.one] = 1
-        self._workspace = loop_workspace(self._learner, joints)
+        self._learner, self._workspace = self._made()
+
+    def _made(self) -> tuple[Any, Any]:
+        """Return what kernels learn by and what they remember; with the next two, all that depends on the kernels."""
+        made = learner(self._agent.weights(), self._agent.settings, self.learning_rate)
+        return made, loop_workspace(made, self._agent.window.joints)
+
+    def _begin_acting(self) -> None:
+        begin_acting(self._learner, self.schedule, self._x, self._workspace, self._random)
+
+    def _learn_and_act(self, seen: tuple[Any, ...], is_over: bool) -> None:
+        learn_and_act(self._learner, self.schedule, self._x, self._workspace, self._random, seen, is_over)
 
     def begin(self, state: ArrayLike, goal: ArrayLike) -> None:
         """Begin an episode in the scaled ``state`` (state_size,) towards ``goal`` (joints,) [counts]."""
@@ -192,7 +201,7 @@ class OnlineLearner:
         goal = np.asarray(goal, np.float64).reshape(window.joints)
         self._x[self._layout.goal : self._layout.one] = scaled_goal(goal, scaling)
         self._x[: self._layout.command] = self._checked(state)
-        begin_acting(self._learner, self.schedule, self._x, self._workspace, self._random)
+        self._begin_acting()
 
     def act(self) -> NDArray[np.int64]:
         """Return the actions (joints,) of the current state; they stay the same until :meth:`observe`."""
@@ -224,7 +233,7 @@ class OnlineLearner:
     def follow(self, next_state: ArrayLike) -> None:
         """Go on in ``next_state`` without learning, as if an episode began there."""
         self._x[: self._layout.command] = self._checked(next_state)
-        begin_acting(self._learner, self.schedule, self._x, self._workspace, self._random)
+        self._begin_acting()
 
     def weights(self) -> NDArray[np.float32]:
         """Return a copy of the weights as they are now."""
@@ -241,7 +250,7 @@ class OnlineLearner:
         paid = np.broadcast_to(np.asarray(reward, np.float64), self._workspace.paid.shape).copy()
         next_state = self._checked(next_state)
         seen = paid, self._there(next_state), next_state
-        learn_and_act(self._learner, self.schedule, self._x, self._workspace, self._random, seen, bool(terminal))
+        self._learn_and_act(seen, bool(terminal))
 
     def _there(self, state: NDArray[np.float32]) -> NDArray[np.bool_]:
         """Return which joints are at their goals in the scaled ``state``, shape (joints,)."""
@@ -256,7 +265,7 @@ class OnlineLearner:
     @property
     def agent(self) -> Agent:
         """The agent with the weights as they are now."""
-        return self._agent.with_weights(self._learner.weights)
+        return self._agent.with_weights(self.weights())
 
     def get_state(self) -> bytes:
         """Return everything that the future depends on, besides what the learner was made with."""

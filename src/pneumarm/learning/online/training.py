@@ -82,16 +82,18 @@ class ShapedLearner(Learner[AgentT], Generic[AgentT, SettingsT]):
     def __init__(self, env: Environment, simulation: Simulation, settings: SettingsT, seed: int, number: int) -> None:
         super().__init__()
         self._env, self._simulation, self._settings, self._seed = env, simulation, settings, seed
-        draw = np.random.default_rng([seed, _WEIGHTS, number])
-        self._weights = pack(
-            draw_networks(simulation.window, settings, draw, simulation.spec.muscles), simulation.window
-        )
+        self._weights = self._drawn(np.random.default_rng([seed, _WEIGHTS, number]))
         self._random = random_state((seed, _TRAINING, number))
         self._first = initial_deviation(settings, simulation.spec)
         self._shaping = np.array([self._first, 0.0])
         """Deviation and performance."""
         self._counts = np.zeros(3, np.int64)
         """Episodes, steps, and whether it met the criterion."""
+
+    def _drawn(self, random: np.random.Generator) -> NDArray[np.float32]:
+        """Return the weights that learning begins with: those of the thesis' networks."""
+        window, muscles = self._simulation.window, self._simulation.spec.muscles
+        return pack(draw_networks(window, self._settings, random, muscles), window)
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Return all that its future depends on, by name."""
@@ -151,7 +153,7 @@ class ShapedLearner(Learner[AgentT], Generic[AgentT, SettingsT]):
         """Learn from ``count`` episodes; return the stage of shaping, the performance and the processor time."""
         now = stage(float(self._shaping[0]), self._settings, self._simulation.spec)
         # What threads write must not lie on a cache line together, or each slows the other down.
-        one = _apart(episode(self._env, self._random))
+        one = apart(episode(self._env, self._random))
         began = time.thread_time()
         performance, steps, count = self._run(now.schedule, one, count)
         spent = time.thread_time() - began
@@ -168,8 +170,8 @@ class OnlineTrainee(ShapedLearner[Agent, TrainSettings]):
     """The thesis' networks."""
 
     def _run(self, schedule: Schedule, one: Episode, count: int) -> tuple[float, int, int]:
-        worker = _apart(learner(self._weights, self._settings))
-        remembered = _apart(loop_workspace(worker, one.goal.size))
+        worker = apart(learner(self._weights, self._settings))
+        remembered = apart(loop_workspace(worker, one.goal.size))
         found: tuple[float, int, int] = train_episodes(
             self._env, worker, schedule, one, remembered, count, float(self._shaping[1])
         )
@@ -193,10 +195,10 @@ class OnlineTrainee(ShapedLearner[Agent, TrainSettings]):
         )
 
 
-def _apart(value: Any) -> Any:
+def apart(value: Any) -> Any:
     """Return a copy of ``value``, an array or named tuples of them, each with a cache line of nothing around it."""
     if isinstance(value, tuple):
-        return type(value)(*(_apart(part) for part in value))
+        return type(value)(*(apart(part) for part in value))
     if not isinstance(value, np.ndarray):
         return value
     line = _CACHE_LINE // value.itemsize

@@ -199,7 +199,9 @@ def test_too_little_is_refused(capsys: pytest.CaptureFixture[str], tmp_path: Pat
     assert Outcome(capsys, "collect", "virtual", tmp_path / "a.db", "--transitions", 999).is_refused("1,000")
     assert Outcome(capsys, "run", "--out", tmp_path / "run", "--transitions", 100).is_refused("1000")
     asked = ("transfer", agent, "--arm", "virtual", "--out", tmp_path / "t")
-    assert Outcome(capsys, *asked, "--test-episodes", 0).is_refused("test_episodes cannot be 0; expected `int` >= 1")
+    assert Outcome(capsys, *asked, "--test-episodes", 0).is_refused(
+        "test_episodes cannot be 0; expected a whole number, 1 or more"
+    )
     assert not list(tmp_path.iterdir())
 
 

@@ -49,7 +49,7 @@ from pneumarm.learning.servo.settings import ServoSettings
 from pneumarm.learning.training import Progress, Training
 from pneumarm.learning.values import VALUES, ValueAgent
 from pneumarm.learning.values.agent import KIND as LEARNED_VALUES
-from pneumarm.settings import Settings, Valid
+from pneumarm.settings import Settings, Valid, in_words
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.task.acting import test_acting
 from pneumarm.task.begin import BeginStates
@@ -210,7 +210,7 @@ class LearnSettings(Settings):
             found = msgspec.convert({**self.own, **method.fixed}, method.settings, strict=False)
             return replace(found)  # msgspec leaves defaults in the class, where vars() does not see them
         except msgspec.ValidationError as error:
-            raise UnusableInput(f"method {self.method}: {error}") from error
+            raise UnusableInput(f"method {self.method}: expected {in_words(error)}") from error
 
 
 def train(

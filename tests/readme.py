@@ -5,7 +5,8 @@ import shlex
 from pathlib import Path
 
 ROOT = Path(__file__).parent.parent
-PAGES = ("README.md", "docs/tutorial.md", *(f"docs/how-to/{name}.md" for name in ("move", "see", "python", "new-arm")))
+_HOW_TO = ("move", "see", "python", "new-arm")
+PAGES = ("README.md", "docs/tutorial.md", *(f"docs/how-to/{name}.md" for name in _HOW_TO))
 """In the order in which a new user reads them: later ones use what earlier ones made."""
 
 

@@ -1,12 +1,15 @@
 """What the commands share."""
 
 import math
+import os
 import shlex
+import sys
+import webbrowser
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from time import monotonic
-from typing import Annotated, Any
+from typing import Annotated, Any, TextIO
 
 import numpy as np
 from cyclopts import Parameter, Token
@@ -59,6 +62,16 @@ def move_command(controller: Path, arm: str, spec: ArmSpec, goal_range: Any) -> 
     angles = (_EXAMPLE if low <= _EXAMPLE <= high else (low + high) / 2 for low, high in spec.degrees(goal_range))
     goal = ",".join(f"{angle:.3g}deg" for angle in angles)
     return f"`{shlex.join(['pneumarm', 'move', str(controller), '--arm', arm, goal])}`"
+
+
+def open_page(address: str, wanted: bool | None, said_on: TextIO) -> None:
+    """Open ``address`` in the browser if that is ``wanted``, or by default if somebody is there to see it.
+
+    That is where there is a screen, what is ``said_on`` is a terminal, and no CI runs this.
+    """
+    graphical = sys.platform in ("win32", "darwin") or "DISPLAY" in os.environ or "WAYLAND_DISPLAY" in os.environ
+    if wanted or (wanted is None and graphical and said_on.isatty() and "CI" not in os.environ):
+        webbrowser.open(address)
 
 
 @contextmanager

@@ -1,13 +1,11 @@
 """``pneumarm live``."""
 
-import os
 import secrets
 import sys
-import webbrowser
 from contextlib import suppress
 from pathlib import Path
 
-from pneumarm.commands.common import Json, OwnMethod
+from pneumarm.commands.common import Json, OwnMethod, open_page
 from pneumarm.console import say, show, table
 from pneumarm.errors import UnusableInput
 from pneumarm.live.learning import TRANSFER, TRANSITIONS
@@ -53,7 +51,7 @@ def live_(
     token
         What the address of the page must hold; by default made up where others than this machine can reach it.
     browser
-        Open the page; by default where there is a screen.
+        Open the page; by default where there is a screen, a terminal and no variable CI.
     transitions
         Readings to record where the arm has still to learn.
     seed
@@ -79,8 +77,7 @@ def live_(
 
     def opened() -> None:
         say(f"open {server.url}")
-        if browser or (browser is None and _has_screen()):
-            webbrowser.open(server.url)
+        open_page(server.url, browser, sys.stderr)
 
     with live_arm, suppress(KeyboardInterrupt):  # that is how it is meant to end
         server.run(opened)
@@ -121,9 +118,3 @@ def _is_new(name: str) -> bool:
 def _check_transferred(folder: Path) -> None:
     if not any(folder.glob("*.safetensors")):
         raise UnusableInput(f"{folder}: holds no run, and is not empty; give another folder")
-
-
-def _has_screen() -> bool:
-    """Whether a browser that is opened can be seen."""
-    graphical = sys.platform in ("win32", "darwin") or "DISPLAY" in os.environ or "WAYLAND_DISPLAY" in os.environ
-    return graphical and sys.stderr.isatty()

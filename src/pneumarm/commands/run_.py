@@ -1,5 +1,6 @@
 """``pneumarm run``."""
 
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -7,7 +8,7 @@ from typing import Annotated, Any, Literal
 import msgspec
 from rich.table import Table
 
-from pneumarm.commands.common import COLUMNS, HEADINGS, Json, Monitoring, Settings, move_command
+from pneumarm.commands.common import COLUMNS, HEADINGS, Json, Monitoring, Settings, move_command, open_page
 from pneumarm.commands.config_file import as_config
 from pneumarm.commands.versions_ import say_history
 from pneumarm.console import say, show, table
@@ -15,6 +16,7 @@ from pneumarm.control.condition import complaints
 from pneumarm.errors import UnusableInput
 from pneumarm.files import write_text
 from pneumarm.progress import compiling, progress, seconds_since_start
+from pneumarm.report.files import REPORT
 from pneumarm.run import Run, RunSettings
 from pneumarm.transitions import Store
 
@@ -29,6 +31,7 @@ def run_(
     monitor: Monitoring = "stop",
     settings: Annotated[RunSettings, Settings] = RunSettings(),
     write_config: Path | None = None,
+    browser: bool | None = None,
     json: Json = False,
 ) -> None:
     """Do the whole job: collect, fit, train, test, transfer, report.
@@ -49,6 +52,8 @@ def run_(
 
         They are those given, with what each means; the file must not exist. Change there what you like and call
         `pneumarm run --config FILE`.
+    browser
+        Open the report; by default where there is a screen, a terminal and no variable CI.
     """
     if preset == "thesis":
         settings = settings.of_the_thesis()
@@ -76,11 +81,14 @@ def run_(
     beside = results["rehearsal_memory_mb"]
     also = f", {beside:.0f} MB in the process that compiled beside it" if beside else ""
     say(
-        f"report: {out / 'report.html'}; {_took(sum(results['wall_seconds'].values()))}, "
+        f"done in {_took(sum(results['wall_seconds'].values()))}, "
         f"at most {results['peak_memory_mb']:.0f} MB of memory{also}"
     )
     with Store.open(run.store) as store:
         say(f"move the arm with {move_command(out, settings.arm, store.spec, store.percentiles())}")
+    page = (out / REPORT).resolve().as_uri()
+    say(f"report: {page}")
+    open_page(page, False if json else browser, sys.stdout)
 
 
 def how_it_moves(results: dict[str, Any]) -> Iterator[Table]:

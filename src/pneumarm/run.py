@@ -69,7 +69,7 @@ RECORDED = "recorded.svg"
 """A picture that plays: how the arm moved at the end of its recording."""
 
 _PLANNED = 40  # movements, by default
-_DRAWN = {"transfer": ("learned",), "settle": ("learned", "moved")}
+_DRAWN = {"transfer": ("learned",), "settle": ("learned", "moved", "reached")}
 """Parts of the report that can be drawn once a stage begins: nothing that it says in them changes any more."""
 
 

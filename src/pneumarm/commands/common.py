@@ -49,10 +49,6 @@ Monitoring = Annotated[
     ),
 ]
 """What is done about faults of an arm that are found while it moves."""
-COLUMNS = ("episodes", "reward", "success_rate", "actions", "switches")
-"""Figures of movements that tables show."""
-HEADINGS = ("movements", *(name.replace("_", " ") for name in COLUMNS[1:]))
-"""What they are called there."""
 _EXAMPLE = 10.0  # degrees
 _LOOK = 0.1  # s between two lines that a person can read
 

@@ -8,13 +8,15 @@ from typing import Annotated, Any, Literal
 import msgspec
 from rich.table import Table
 
-from pneumarm.commands.common import COLUMNS, HEADINGS, Json, Monitoring, Settings, move_command, open_page
+from pneumarm.commands.common import Json, Monitoring, Settings, move_command, open_page
 from pneumarm.commands.config_file import as_config
+from pneumarm.commands.figures import reaching_table
 from pneumarm.commands.versions_ import say_history
 from pneumarm.console import say, show, table
 from pneumarm.control.condition import complaints
 from pneumarm.errors import UnusableInput
 from pneumarm.files import write_text
+from pneumarm.moving.told import told_figures
 from pneumarm.progress import compiling, progress, seconds_since_start
 from pneumarm.report.files import REPORT
 from pneumarm.run import Run, RunSettings
@@ -69,10 +71,8 @@ def run_(
         "on arrival": results["transfer"]["before"],
         "after adaptation": results["transfer"]["after"],
     }
-    rows = [(name, *[figures[column] for column in COLUMNS]) for name, figures in phases.items()]
-    settles = run.settings.settles
-    title = "Reaching goals, for which it was not trained" if settles else "Ledger"
-    show(results, json, lambda: [*how_it_moves(results), table(("", *HEADINGS), rows, title=title)])
+    reaching = reaching_table(phases, trained_for=not run.settings.settles)
+    show(results, json, lambda: [*how_it_moves(results), reaching])
     say_history(out)
     for stage, doing in (("collect", "collecting"), ("transfer", "moving")):
         for line in complaints(results[stage], doing):
@@ -96,23 +96,16 @@ def how_it_moves(results: dict[str, Any]) -> Iterator[Table]:
     found = results["settle"]
     if not found:
         return
-    seconds = found["median_seconds"]
-    rows = [
-        (
-            f"settles within {found['tolerance_deg']:g}° of",
-            f"{round(found['settled'] * found['movements'])} of {found['movements']} goals",
-        ),
-        ("half of them within", None if seconds is None else f"{seconds:.2f} s"),
-        ("rests off by", f"{found['rest_error_deg']:.2f}°"),
-        ("valve changes a second", f"{found['valve_changes_per_second']:.0f}"),
+    rows: list[tuple[str, str, str]] = [
+        *told_figures(found),
+        ("valve changes a second", f"{found['valve_changes_per_second']:.0f}", ""),
     ]
-    if "overshoot_deg" in found:  # not in results of a version before this
-        rows.append(("half of them overshoot by less than", f"{found['overshoot_deg']:.1f}°"))
-        rows.append(("valve changes in the last second", f"{found['valve_changes_last_second']:.0f} a joint"))
+    if "valve_changes_last_second" in found:  # not in results of a version before this
+        rows.append(("valve changes in the last second", f"{found['valve_changes_last_second']:.0f} a joint", ""))
     for one in results["track"]:
         errors = ", ".join(f"{error:.2f}°" for error in one["rms_error_deg"])
-        rows.append((f"follows {one['amplitude_deg']:.0f}°, {one['frequency_hz']:g} Hz, off by", errors))
-    yield table(("adapted, on the arm", ""), rows, title="How it moves")
+        rows.append((f"follows {one['amplitude_deg']:.0f}°, {one['frequency_hz']:g} Hz, off by", errors, ""))
+    yield table(("adapted, on the arm", "", "normal"), rows, title="How it moves")
 
 
 def _spent(results: dict[str, Any]) -> Iterator[str]:

@@ -38,6 +38,7 @@ from pneumarm.report.playing import playing
 from pneumarm.report.style import of_joint, quantities
 from pneumarm.report.thesis import GOAL_TOLERANCE
 from pneumarm.task import Movements, running_time
+from pneumarm.transitions.filtering import NEW_CELLS
 
 COVERAGE, ONE_STEP = "Coverage of the collected data", "How well the simulation predicts one step"
 """Titles of sections that others lead to."""
@@ -77,21 +78,16 @@ def learning_sections(run: RunData) -> list[Section]:
 
 
 def moved(run: RunData) -> list[Section]:
-    """Return the sections of ``run`` on how an agent moved the arm and learned from it."""
-    sections = []
-    if run.adaptation is not None:
-        sections.append(adapted(run.adaptation, run.spec))
-    if run.demonstrations:
-        sections.append(demonstrated(run.demonstrations, run.spec))
-    return sections
+    """Return the sections of ``run`` on how an agent learned from moving the arm."""
+    return [] if run.adaptation is None else [adapted(run.adaptation, run.spec)]
 
 
 def reached(run: RunData) -> list[Section]:
-    """Return the figure of the thesis' task, of movements enough for averages to say anything."""
-    phases = [] if run.transfer is None else run.transfer.phases.values()
-    if run.transfer is None or max((phase.n for phase in phases), default=0) < _FEWEST_AVERAGED:
-        return []
-    return [transferred(run.transfer, run.test)]
+    """Return the figures of the thesis' task; averages only where there are enough movements."""
+    sections = [demonstrated(run.demonstrations, run.spec)] if run.demonstrations else []
+    if run.transfer is not None and max(phase.n for phase in run.transfer.phases.values()) >= _FEWEST_AVERAGED:
+        sections.append(transferred(run.transfer, run.test))
+    return sections
 
 
 PARTS: Mapping[str, Callable[[RunData], list[Section]]] = {
@@ -228,10 +224,7 @@ def coverage_section(data: CoverageData, spec: ArmSpec) -> Section:
     ]
     if len(data.growth) > 1:
         share = new_share(data.growth)
-        text.append(
-            f"The second half of the data added {share:.1%} of the occupied cells. Whether it made the "
-            "simulation any better is another question, which pneumarm coverage answers."
-        )
+        text.append(f"The second half of the data added {share:.1%} of the occupied cells. {NEW_CELLS}")
     return Section(
         COVERAGE,
         text,

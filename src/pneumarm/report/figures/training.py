@@ -59,7 +59,10 @@ def training_curves(
             place.plot(curves[agent, upto, 0] / 1e3, factor * values[agent, upto], **style, marker=marker)
         if not evaluated.any():
             nothing(place, "no agent was trained")
-    handles, words = [key(DARK, lw=1.8), key(GREY, lw=0.6)], ["chosen agent", f"the other {agents - 1}"]
+    handles, words = (
+        [key(DARK, lw=1.8), key(GREY, lw=0.6)],
+        ["chosen agent", "the other" if agents == 2 else f"the other {agents - 1}"],
+    )
     if evaluated.any() and {"performance", CRITERION} <= set(columns):
         best = curves[chosen, : int(evaluated[chosen])]
         of["performance"][0].plot(best[:, 0] / 1e3, best[:, columns.index(CRITERION)], color=MIDDLE, ls="--")

@@ -253,5 +253,5 @@ def test_the_adaptation_is_told_with_its_figures():
     first = np.sqrt(adapted.squares[:100, 1, 0].mean())
     assert f"angle {first:.2f} in the first hundred" in words
     assert words.endswith(
-        "change noticed after movement 46; new version after movement 60; version taken back after movement 100."
+        "change noticed after movement 46; new version after movement 60; version rolled back after movement 100."
     )

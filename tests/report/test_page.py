@@ -19,6 +19,7 @@ from pneumarm.report.run_report import read_run, run_page, write_report
 from pneumarm.report.sections import RunData, adapted, all_sections, followed, moving, overview
 from pneumarm.task import Movements, read_episodes, write_episodes
 from pneumarm.task.movements import COLUMNS, movements
+from test_words import offences
 
 VOID = {"meta", "img", "source", "link", "br", "hr", "input"}
 MOST_BYTES = 6e6
@@ -96,6 +97,10 @@ def test_ids_are_unique_and_links_lead_to_sections(html, page):
     assert "<nav" not in html
     referred = [attrs["aria-labelledby"] for _, attrs in page.elements if "aria-labelledby" in attrs]
     assert set(referred) <= set(page.ids)
+
+
+def test_every_word_of_it_is_native(page):
+    assert offences(" ".join(" ".join(page.text).split())) == []
 
 
 def test_page_stays_small(html):

@@ -24,7 +24,7 @@ def settled_in(simulation: Simulation, agent: AnyAgent, seed: int = 0) -> dict[s
 
 
 def settling_told(found: Mapping[str, Any]) -> list[Table | str]:
-    """Return the figures of settling in a simulation with what is normal there, and why that is less than on an arm."""
+    """Return the figures of settling in a simulation with what is normal there, and why an arm does better."""
     why = "The simulation adds what it does not know of the arm as noise: on the arm more goals are settled at."
     return [table(("settling, in the simulation", "", "normal"), told_figures(found, IN_SIMULATION)), why]
 

@@ -39,7 +39,7 @@ def live_(
     ----------
     controllers
         The folder of a run, files of agents or of ``pneumarm tune``, or plan:SIM. With a folder in which nothing has
-        been learned yet, by default pneumarm-run, the page does the whole job when it is told to.
+        been learned yet, by default pneumarm-run, the page does the whole job at the press of a button.
     arm
         virtual, virtual:seed=N, serial:PORT, simulation:FILE or python:module:callable; by default that of the run,
         or else virtual.
@@ -55,7 +55,7 @@ def live_(
     transitions
         Readings to record where the arm has still to learn.
     seed
-        Of a virtual arm's noise, and of what is learned.
+        Random seed of a virtual arm's noise and of what is learned.
     method
         The method that trained the agent, MODULE:NAME, if that is one of your own that is not installed.
     """

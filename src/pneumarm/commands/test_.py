@@ -45,7 +45,7 @@ def test_(
     episodes
         How many movements (thesis section 5.2: 10,000).
     seed
-        Of the begin states, the goals and the noise.
+        Random seed of begin states, goals and noise.
     method
         The method that trained it, MODULE:NAME, if that is one of your own that is not installed.
     """

@@ -42,7 +42,7 @@ def train_(
     out
         File of the agent to write; it contains all that it needs.
     seed
-        Of the initial weights, the exploration and the begin states.
+        Random seed of initial weights, exploration and begin states.
     agents
         Agents trained at once, of which the best is kept; by default as many as the method's settings say.
     tensorboard

@@ -38,7 +38,7 @@ def transfer_(
     arm
         virtual, virtual:seed=N, serial:PORT, simulation:FILE or python:module:callable.
     seed
-        Of the begin states, the goals and the exploration, and of a virtual arm's noise.
+        Random seed of begin states, goals and exploration, and of a virtual arm's noise.
     out
         Folder for episodes.csv, the store of all movements and the adapted agent; created if it does not exist.
     method

@@ -447,7 +447,7 @@ def adapted(data: Adapted, spec: ArmSpec) -> Section:
     text = [
         "After every movement the simulation's errors on the arm are compared with those of its fit. Where a "
         "simulation that is fitted to the newest movements predicts others of them better, the agent becomes a new "
-        "version; one that earns less than that before it is taken back."
+        "version; one that earns less than the one before is rolled back."
     ]
     text += [f"{sentence[0].upper()}{sentence[1:]}." for sentence in happened]
     if not happened:

@@ -5,7 +5,8 @@ import pytest
 
 from pneumarm.arm import ArmSpec
 from pneumarm.commands.collect_ import _above_limit
-from pneumarm.moving.told import told_figures
+from pneumarm.commands.figures import figure_rows
+from pneumarm.moving.told import Normal, told_figures
 
 FOUND = {
     "movements": 40,
@@ -21,7 +22,9 @@ def test_settling_is_told_in_four_figures_with_what_is_normal() -> None:
     told = told_figures(FOUND)
     assert [one.value for one in told] == ["97.5 %", "0.33 s", "0.11°", "0.8°"]
     assert [one.name.split(",")[0] for one in told] == ["settled within 1°", "time", "rest error", "overshoot"]
-    assert all(one.normal.endswith((" or more", " or less")) for one in told)
+    assert [one.normal for one in told] == ["90 % or more", "0.8 s or less", "0.3° or less", "2° or less"]
+    assert all(one.is_normal for one in told)
+    assert [row[2].endswith("(!)") for row in figure_rows(FOUND, Normal(0.98, 0.2, 0.1, 0.5))] == [True] * 4
 
 
 def test_what_is_not_known_is_left_open() -> None:

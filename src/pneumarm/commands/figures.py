@@ -7,7 +7,7 @@ from rich.table import Table
 
 from pneumarm.console import table
 from pneumarm.learning.agents import AnyAgent, goals_of
-from pneumarm.moving.told import IN_SIMULATION, told_figures
+from pneumarm.moving.told import IN_SIMULATION, ON_THE_ARM, Normal, told_figures
 from pneumarm.moving.trial import MoveTrialSettings, try_moving
 from pneumarm.simulation import Simulation, SimulationArm
 
@@ -26,7 +26,15 @@ def settled_in(simulation: Simulation, agent: AnyAgent, seed: int = 0) -> dict[s
 def settling_told(found: Mapping[str, Any]) -> list[Table | str]:
     """Return the figures of settling in a simulation with what is normal there, and why an arm does better."""
     why = "The simulation adds what it does not know of the arm as noise: on the arm more goals are settled at."
-    return [table(("settling, in the simulation", "", "normal"), told_figures(found, IN_SIMULATION)), why]
+    return [table(("settling, in the simulation", "", "normal"), figure_rows(found, IN_SIMULATION)), why]
+
+
+def figure_rows(found: Mapping[str, Any], normal: Normal = ON_THE_ARM) -> list[tuple[str, str, str]]:
+    """Return the figures of settling as rows of a table; one that is not normal says so."""
+    return [
+        (one.name, one.value, one.normal if one.is_normal else f"{one.normal} (!)")
+        for one in told_figures(found, normal)
+    ]
 
 
 def reaching_table(made: Mapping[str, Mapping[str, Any]], *, trained_for: bool) -> Table:

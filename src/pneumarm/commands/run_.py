@@ -10,13 +10,12 @@ from rich.table import Table
 
 from pneumarm.commands.common import Json, Monitoring, Settings, move_command, open_page
 from pneumarm.commands.config_file import as_config
-from pneumarm.commands.figures import reaching_table
+from pneumarm.commands.figures import figure_rows, reaching_table
 from pneumarm.commands.versions_ import say_history
 from pneumarm.console import say, show, table
 from pneumarm.control.condition import complaints
 from pneumarm.errors import UnusableInput
 from pneumarm.files import write_text
-from pneumarm.moving.told import told_figures
 from pneumarm.progress import compiling, progress, seconds_since_start
 from pneumarm.report.files import REPORT
 from pneumarm.run import Run, RunSettings
@@ -97,7 +96,7 @@ def how_it_moves(results: dict[str, Any]) -> Iterator[Table]:
     if not found:
         return
     rows: list[tuple[str, str, str]] = [
-        *told_figures(found),
+        *figure_rows(found),
         ("valve changes a second", f"{found['valve_changes_per_second']:.0f}", ""),
     ]
     if "valve_changes_last_second" in found:  # not in results of a version before this

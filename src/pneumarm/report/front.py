@@ -23,12 +23,12 @@ def headline(run: RunData) -> list[ToldFigure]:
         if made is None or not made.n:
             continue
         won = made.success
-        figures = [ToldFigure(f"reached, of {made.n:,} goals {where}", f"{100 * won.mean():.4g} %", "")]
+        figures = [ToldFigure(f"reached, of {made.n:,} goals {where}", f"{100 * won.mean():.4g} %")]
         if won.any():
             seconds = float(np.median(made.actions[won])) * run.spec.period
             off = np.abs(made.angle_end - made.goal)[won].max(axis=1).mean() / run.spec.counts_per_degree
-            figures.append(ToldFigure("time, half of the goals", f"{seconds:.2f} s", ""))
-            figures.append(ToldFigure("error when reached, on average", f"{off:.2f}°", ""))
+            figures.append(ToldFigure("time, half of the goals", f"{seconds:.2f} s"))
+            figures.append(ToldFigure("error when reached, on average", f"{off:.2f}°"))
         return figures
     return []
 

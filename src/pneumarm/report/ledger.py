@@ -132,8 +132,8 @@ def bound_table(bound: Mapping[str, Any]) -> Table:
         "The bound: the best valve sequences of at most three switches that planning with the virtual arm's true "
         "physics finds for the first movements of the tests on the arm; in open loop planned once, on an arm without "
         "noise, in closed loop again at every control step, on the arm with its sensors. The controller is compared "
-        f"movement by movement with what is planned in just these; 95% confidence intervals in brackets.{unproven} The thesis "
-        "could not know it (section 5.5.1).",
+        f"movement by movement with what is planned in just these; 95% confidence intervals in brackets."
+        f"{unproven} The thesis could not know it (section 5.5.1).",
     )
 
 

@@ -65,7 +65,7 @@ def move_(
                 unusable = error
     # What is printed is printed even where one failed, or was none: it says which.
     result = {"movements": [one.results() for one in made]}
-    header = ("goal", "settled after [s]", "rest error [deg]", "tries", "valve changes", "air [l]")
+    header = ("goal", "settled after [s]", "rest error [deg]", "overshoot [deg]", "tries", "valve changes", "air [l]")
     show(result, json, lambda: [table(header, [_row(one) for one in made], arm)] if made else [])
     if unusable is not None:
         raise unusable
@@ -96,4 +96,5 @@ def _row(one: Moved) -> tuple[object, ...]:
     if one.hand_error is not None:
         rest += f" (hand: {1e3 * one.hand_error:.1f} mm)"
     air = None if one.air is None else f"{one.air:.2f}"
-    return _goal(one), settled, rest, one.tries, one.switches, air
+    over = ", ".join(f"{e:.1f}" for e in one.overshoot)
+    return _goal(one), settled, rest, over, one.tries, one.switches, air

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import msgspec
+from cyclopts import Parameter
 from rich.table import Table
 
 from pneumarm.commands.common import Json, Monitoring, Settings, move_command, open_page
@@ -32,7 +33,7 @@ def run_(
     monitor: Monitoring = "stop",
     settings: Annotated[RunSettings, Settings] = RunSettings(),
     write_config: Path | None = None,
-    browser: bool | None = None,
+    no_browser: Annotated[bool, Parameter(negative="")] = False,
     json: Json = False,
 ) -> None:
     """Do the whole job: collect, fit, train, test, transfer, report.
@@ -49,12 +50,14 @@ def run_(
         The thesis' sizes, and its way of collecting (valves open for whole periods), are taken for what no other
         option says.
     write_config
-        Write all options into this TOML file, and do no more.
+        Write all options into this TOML file, and stop.
 
         They are those given, with what each means; the file must not exist. Change there what you like and call
         `pneumarm run --config FILE`.
-    browser
-        Open the report; by default where there is a screen, a terminal and no variable CI.
+    no_browser
+        Do not open the report at the end.
+
+        It is opened where there is a screen and a terminal, and no environment variable CI.
     """
     if preset == "thesis":
         settings = settings.of_the_thesis()
@@ -87,7 +90,7 @@ def run_(
         say(f"move the arm with {move_command(out, settings.arm, store.spec, store.percentiles())}")
     page = (out / REPORT).resolve().as_uri()
     say(f"report: {page}")
-    open_page(page, False if json else browser, sys.stdout)
+    open_page(page, False if json or no_browser else None, sys.stdout)
 
 
 def how_it_moves(results: dict[str, Any]) -> Iterator[Table]:

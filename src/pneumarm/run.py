@@ -100,7 +100,7 @@ class RunSettings(LearnSettings):
     enough: EnoughSettings = field(default_factory=EnoughSettings)
     """When more would not help."""
     test_episodes: PositiveInt = 10_000
-    """Movements of the test in simulation (thesis section 5.2)."""
+    """Movements tested in simulation (thesis section 5.2)."""
     bound_episodes: NonNegativeInt | None = None
     """Movements to goals that are planned, as a bound.
 

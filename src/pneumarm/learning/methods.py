@@ -160,7 +160,7 @@ class LearnSettings(Settings):
     settle, hold and track name one and the same agent, which does all three (the default); reach one that reaches
     goals as in the thesis, where flying through one slowly enough counts."""
     method: str | None = None
-    """servo, policy, batched, hierarchy, esp, sarsa, q-learning, a rule of section 4.2, or MODULE:NAME of your own.
+    """servo, policy, batched, hierarchy, esp, sarsa, q-learning, a rule of section 4.2, or MODULE:NAME.
 
     batched: the thesis' networks learned in many arms at once; hierarchy: an upper agent sets subgoals of the thesis'
     agents; esp: an evolved recurrent network; sarsa and q-learning: the thesis'; td, monte-carlo, sarsa-lambda,

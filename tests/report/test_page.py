@@ -210,7 +210,7 @@ def test_lights_say_what_is_known_and_lead_to_more():
     assert [one.good for one in unknown] == [None, None, None]
     results = {
         "collect": {"enough": {"verdict": "enough: the second half lowers the error not at all"}, "findings": []},
-        "simulation": {"relative_error": {"angle": 0.1}},
+        "simulation": {"std": {"angle": 2.0}},  # counts
     }
     assert [(one.good, one.answer) for one in lights(RunData(ArmSpec(), results))] == [
         (True, "Yes"),
@@ -218,7 +218,7 @@ def test_lights_say_what_is_known_and_lead_to_more():
         (True, "No"),
     ]
     results["collect"] = {"enough": {"verdict": "collect as much again: it helps"}, **builders.found(builders.FOUND)}
-    results["simulation"]["relative_error"]["angle"] = [0.1, 0.4]
+    results["simulation"]["std"]["angle"] = [2.0, 20.0]
     bad = lights(RunData(ArmSpec(), results))
     assert [one.good for one in bad] == [False, False, False]
     assert "60%" in bad[1].words

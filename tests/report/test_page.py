@@ -221,7 +221,7 @@ def test_lights_say_what_is_known_and_lead_to_more():
     results["simulation"]["std"]["angle"] = [2.0, 20.0]
     bad = lights(RunData(ArmSpec(), results))
     assert [one.good for one in bad] == [False, False, False]
-    assert "60%" in bad[1].words
+    assert "1.76°" in bad[1].words
     assert bad[2].words == "Stuck valve: the inlet is stuck closed (joint 1, muscle 2, collecting)."
     titles = {section.title for section in all_sections(builders.run(small=True))}
     assert {one.title for one in bad} <= titles

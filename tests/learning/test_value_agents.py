@@ -11,7 +11,7 @@ from pneumarm.arm.valves import NEVER
 from pneumarm.errors import PneumarmError, UnusableInput
 from pneumarm.files import read_arrays, write_arrays
 from pneumarm.learning import METHODS, Learns, LearnSettings, load_agent, test, train
-from pneumarm.learning.online.loop import Schedule
+from pneumarm.learning.online.schedule import Schedule
 from pneumarm.learning.values import VALUES, ValueAgent, ValueSettings
 from pneumarm.learning.values.agent import KIND
 from pneumarm.learning.values.learner import value_memory, weigh

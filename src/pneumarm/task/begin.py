@@ -99,16 +99,19 @@ class BeginParameters(NamedTuple):
     """Lowest and highest angle of the sensor, shape (2,) [counts]."""
     weights: NDArray[np.float64]
     """Cumulative probabilities of the sub-intervals of a side, the farthest first, shape (bins,)."""
+    by_length: bool
+    """Whether sides are drawn by the lengths that the deviation leaves them."""
 
 
 def begin_parameters(
-    begin: BeginStates, domain: tuple[float, float], weights: tuple[float, ...] = (1.0,)
+    begin: BeginStates, domain: tuple[float, float], weights: tuple[float, ...] = (1.0,), by_length: bool = False
 ) -> BeginParameters:
     """Return ``begin`` for a kernel; ``weights`` are those of :class:`~pneumarm.learning.online.settings.Shaping`."""
     cumulative = np.cumsum(weights) / np.sum(weights)
     order = np.ascontiguousarray(np.argsort(begin.angle, axis=0, kind="stable").T)
     sorted_ = np.take_along_axis(begin.angle.T, order, axis=1)
-    return BeginParameters(begin.states, begin.angle, order, sorted_, np.array(domain, np.float64), cumulative)
+    ends = np.array(domain, np.float64)
+    return BeginParameters(begin.states, begin.angle, order, sorted_, ends, cumulative, by_length)
 
 
 @part
@@ -164,7 +167,10 @@ def draw_begin(begin, goal, deviation, random):  # type: ignore[no-untyped-def]
         return integer(random, begin.states.shape[0])
     for _ in range(_TRIES):
         joint = integer(random, goal.shape[0]) if goal.shape[0] > 1 else 0
-        low, high = draw_interval(begin.domain, begin.weights, goal[joint], deviation, random)
+        lowest, highest = begin.domain[0], begin.domain[1]
+        if begin.by_length:
+            lowest, highest = max(lowest, goal[joint] - deviation), min(highest, goal[joint] + deviation)
+        low, high = draw_interval((lowest, highest), begin.weights, goal[joint], deviation, random)
         first = count_below(begin.sorted[joint], low)
         count = count_below(begin.sorted[joint], high) - first
         if count > 0:

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.learning.online.agent import Agent
-from pneumarm.learning.online.loop import Schedule, loop_workspace, train_episodes
+from pneumarm.learning.online.loop import loop_workspace, train_episodes
+from pneumarm.learning.online.schedule import Schedule
 from pneumarm.learning.online.settings import TrainSettings
 from pneumarm.learning.online.shaping import adjusted, initial_deviation, stage
 from pneumarm.learning.online.testing import run_test
@@ -130,6 +131,12 @@ class ShapedLearner(Learner[AgentT], Generic[AgentT, SettingsT]):
         return int(self._counts[0])
 
     @property
+    def rate_share(self) -> float:
+        """The learning rate now, as a share of that at the beginning: 1/(1 + k/halving) after k episodes."""
+        halving = self._settings.help.halving
+        return halving / (halving + self.episodes) if halving else 1.0
+
+    @property
     def steps(self) -> int:
         """Learning steps so far."""
         return int(self._counts[1])
@@ -170,7 +177,8 @@ class OnlineTrainee(ShapedLearner[Agent, TrainSettings]):
     """The thesis' networks."""
 
     def _run(self, schedule: Schedule, one: Episode, count: int) -> tuple[float, int, int]:
-        worker = apart(learner(self._weights, self._settings))
+        rate = self._settings.learning_rate * self.rate_share
+        worker = apart(learner(self._weights, self._settings, rate))
         remembered = apart(loop_workspace(worker, one.goal.size))
         found: tuple[float, int, int] = train_episodes(
             self._env, worker, schedule, one, remembered, count, float(self._shaping[1])
@@ -189,7 +197,7 @@ class OnlineTrainee(ShapedLearner[Agent, TrainSettings]):
             spec=simulation.spec,
             window=simulation.window,
             scaling=simulation.scaling,
-            goal_range=simulation.goal_range,
+            goal_range=settings.goals_in(simulation).range,
             networks=unpack(self._weights, simulation.window, settings.hidden, settings.team),
             settings=settings,
         )

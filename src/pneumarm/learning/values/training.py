@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.learning.online.loop import Schedule
+from pneumarm.learning.online.schedule import Schedule
 from pneumarm.learning.online.training import ShapedLearner, apart
 from pneumarm.learning.training import Learner, Progress, Training, identity_of, train_side_by_side
 from pneumarm.learning.values.agent import ValueAgent, run_test
@@ -85,7 +85,8 @@ class ValueTrainee(Tested, ShapedLearner[ValueAgent, ValueSettings]):
         return first_weights(self._simulation, self._settings, random)
 
     def _run(self, schedule: Schedule, one: Episode, count: int) -> tuple[float, int, int]:
-        learner = learner_of(self._simulation, self._settings, self._weights)
+        rate = self._settings.learning_rate * self.rate_share
+        learner = learner_of(self._simulation, self._settings, self._weights, rate)
         memory = apart(value_memory(learner, one.state.x.size, self._settings.cutoff))
         found: tuple[float, int, int] = train_episodes(
             self._env, learner, schedule, one, memory, count, float(self._shaping[1])

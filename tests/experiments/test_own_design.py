@@ -141,7 +141,7 @@ def test_laboratories_of_before_are_gone_on_with(tmp_path: Path) -> None:
     wanted = made.settings()["trials"]["2"]
     before = json.loads(json.dumps(wanted))
     del before["train"]["help"], before["train"]["goal"], before["train"]["noise"]["share"]
-    del before["train"]["shaping"]["sides"], before["fit"]["grid"]
+    del before["train"]["shaping"]["sides"], before["train"]["shaping"]["each"], before["fit"]["grid"]
     claim(tmp_path / "lab", before)
     claim(tmp_path / "lab", wanted)
     with pytest.raises(UnusableInput, match="grid"):

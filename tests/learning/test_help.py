@@ -163,6 +163,30 @@ def test_agents_learn_with_it(name: str, simulation: Simulation, begin: BeginSta
     assert training.validation[0].success.mean() > 0.85
 
 
+def test_each_joint_has_its_own_deviation() -> None:
+    """A joint that is always at its goal gets more room, one that never is gets less; the widest counts for all."""
+    arm = synthetic_simulation(2)
+    shaping = Shaping(each=True, performance_rate=1e-6)  # what the joints did so far hardly changes
+    settings = TrainSettings(agents=1, shaping=shaping)
+    env = environment(arm, synthetic_begin_states(arm), settings)
+    trainee = OnlineTrainee(env, arm, settings, 0, 0)
+    trainee.arrays()["joints"][:] = (100.0, 200.0), (1.0, 0.0)
+    trainee.learn_on()
+    np.testing.assert_allclose(trainee.arrays()["joints"], [(110.0, 194.0), (1.0, 0.0)], atol=1e-3)
+    assert trainee.arrays()["shaping"][0] == pytest.approx(194.0)
+    assert env.begin.shares.tolist() == [1.0, 1.0]  # other agents in the same environment have their own
+
+
+@pytest.mark.parametrize("shares", [(1.0, 0.25), (0.1, 1.0)])
+def test_begin_states_keep_to_the_deviation_of_each_joint(shares: tuple[float, float]) -> None:
+    states = synthetic_begin_states(synthetic_simulation(2))
+    begin = begin_parameters(states, (0.0, 1023.0), Shaping().weights)._replace(shares=np.array(shares))
+    random, goal = random_state(0), np.array([500.0, 500.0])
+    away = np.array([np.abs(states.angle[draw_begin(begin, goal, 300.0, random)] - goal) for _ in range(2000)])
+    assert (away <= 300.0 * np.array(shares)).all()
+    assert (away.max(axis=0) > 0.6 * 300.0 * np.array(shares)).all()
+
+
 def test_a_hierarchy_refuses_it() -> None:
     with pytest.raises(UnusableInput, match="help"):
         _ = LearnSettings(method="hierarchy", own={"help": {"retry": 0.5}}).chosen

@@ -21,7 +21,14 @@ PLAN = "faults.toml"
 SETTINGS = "settings.json"
 PROCEDURES = {"thesis": WHOLE_PERIODS, "ours": CollectSettings(pulses=0.0)}
 """How arms are recorded, by the name of the procedure; the thesis' agents know no pulses."""
-_LATER = {"help": asdict(Help()), "goal": [], "sides": "place", "share": 0.01, "grid": asdict(GridSettings())}
+_LATER = {
+    "help": asdict(Help()),
+    "goal": [],
+    "sides": "place",
+    "each": False,
+    "share": 0.01,
+    "grid": asdict(GridSettings()),
+}
 """Settings of later versions, and their usual values."""
 
 

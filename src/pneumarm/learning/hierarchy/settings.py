@@ -29,4 +29,7 @@ class HierarchySettings(TrainSettings):
     """What it sees: angles and goals alone, or all that the lower agents see."""
 
     def _valid(self) -> Valid:
-        return {"help": self.help == Help() or "none: a hierarchy has its subgoals"}
+        return {
+            "help": self.help == Help() or "none: a hierarchy has its subgoals",
+            "shaping": not self.shaping or not self.shaping.each or "one deviation for all joints",
+        }

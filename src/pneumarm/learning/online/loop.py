@@ -19,6 +19,7 @@ from pneumarm.learning.online.exploration import choose, greedy
 from pneumarm.learning.online.schedule import (
     Retry,
     begin_training,
+    end_training,
     farthest,
     no_retry,
     note_distances,
@@ -70,7 +71,7 @@ def loop_workspace(learner: ActionValues, joints: int) -> Workspace:
         next_actions=np.full(joints, -1, np.int64),
         paid=np.zeros(joints),
         there=np.zeros(joints, np.bool_),
-        retry=no_retry(),
+        retry=no_retry(joints),
     )
 
 
@@ -165,7 +166,7 @@ def train_episodes(environment, learner, schedule, episode, workspace, count, pe
     steps = 0
     for e in range(count):
         actions, _, success = train_episode(environment, learner, schedule, episode, workspace)
-        workspace.retry.is_failed[0] = not success
+        end_training(environment.task, episode, schedule, workspace.retry, success)
         steps += actions
         performance += schedule.performance_rate * ((1.0 if success else 0.0) - performance)
         if performance >= schedule.enough:

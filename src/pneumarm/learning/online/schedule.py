@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from pneumarm.kernels import part
 from pneumarm.random import uniform
-from pneumarm.task.environment import angle, begin_episode
+from pneumarm.task.environment import angle, at_goal, begin_episode
 from pneumarm.task.reward import paid
 
 
@@ -41,17 +41,19 @@ class Schedule(NamedTuple):
 
 
 class Retry(NamedTuple):
-    """How an episode began that may be begun again. Made by :func:`no_retry`."""
+    """How an episode began that may be begun again, and how each joint does. Made by :func:`no_retry`."""
 
     random: NDArray[np.uint64]
     """The random numbers that its goal and begin state were drawn by, and workspace, shape (2, 4)."""
     is_failed: NDArray[np.bool_]
     """Whether it failed, shape (1,)."""
+    performance: NDArray[np.float64]
+    """Moving average by joint of being at its goal in the end, shape (joints,)."""
 
 
-def no_retry() -> Retry:
-    """Return that no episode has failed."""
-    return Retry(np.zeros((2, 4), np.uint64), np.zeros(1, np.bool_))
+def no_retry(joints: int) -> Retry:
+    """Return that no episode has failed, of an arm with so many ``joints``."""
+    return Retry(np.zeros((2, 4), np.uint64), np.zeros(1, np.bool_), np.zeros(joints))
 
 
 @part
@@ -64,6 +66,15 @@ def begin_training(environment, episode, schedule, retry):  # type: ignore[no-un
         return
     retry.random[0] = random
     begin_episode(environment, episode, schedule.deviation, random)
+
+
+@part
+def end_training(task, episode, schedule, retry, is_reached):  # type: ignore[no-untyped-def]
+    """Note how an episode ended: whether it failed, and which joints are at their goals."""
+    retry.is_failed[0] = not is_reached
+    for joint in range(retry.performance.shape[0]):
+        there = 1.0 if at_goal(task, episode, joint) else 0.0
+        retry.performance[joint] += schedule.performance_rate * (there - retry.performance[joint])
 
 
 @part

@@ -72,6 +72,8 @@ class Shaping(Settings):
     sides: Literal["place", "length"] = "place"
     """Whether a side is drawn by the goal's place in the range of angles (thesis: eq. 4.16), or by its own length, as
     the deviation leaves it (table 4.1)."""
+    each: bool = False
+    """Whether each joint has a deviation of its own, by how often it is at its goal in the end (section 6.1.3)."""
 
     def _valid(self) -> Valid:
         return {"weights": sum(self.weights) > 0 or "one above 0"}

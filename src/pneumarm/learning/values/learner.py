@@ -106,7 +106,7 @@ def value_memory(learner: ValueLearner, inputs: int, steps: int) -> ValueMemory:
         cut=np.zeros(agents, np.bool_),
         paid=np.zeros(agents),
         path=path(steps if learner.rule == MONTE_CARLO else 0, agents, variables),
-        retry=no_retry(),
+        retry=no_retry(agents),
     )
 
 

@@ -4,7 +4,14 @@ import numpy as np
 
 from pneumarm.kernels import borrowed, kernel
 from pneumarm.learning.online.exploration import greedy
-from pneumarm.learning.online.schedule import begin_training, farthest, note_distances, pay, schedule_here
+from pneumarm.learning.online.schedule import (
+    begin_training,
+    end_training,
+    farthest,
+    note_distances,
+    pay,
+    schedule_here,
+)
 from pneumarm.learning.values.learner import begin_learning, decide, end_episode, learn, remember, weigh
 from pneumarm.task.environment import begin_episode, take
 from pneumarm.task.noting import goes_on, note_action, note_begin, note_end
@@ -35,7 +42,7 @@ def train_episodes(environment, learner, schedule, episode, memory, count, perfo
             is_reached = take(environment, episode, memory.next_actions)
             pay(task, schedule, episode, is_reached, memory.paid)
             taken += 1
-        memory.retry.is_failed[0] = not is_reached
+        end_training(task, episode, schedule, memory.retry, is_reached)
         steps, episodes = steps + taken, episodes + 1
         performance += schedule.performance_rate * ((1.0 if is_reached else 0.0) - performance)
         if performance >= schedule.enough:

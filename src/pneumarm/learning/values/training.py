@@ -88,9 +88,11 @@ class ValueTrainee(Tested, ShapedLearner[ValueAgent, ValueSettings]):
         rate = self._settings.learning_rate * self.rate_share
         learner = learner_of(self._simulation, self._settings, self._weights, rate)
         memory = apart(value_memory(learner, one.state.x.size, self._settings.cutoff))
+        memory.retry.performance[:] = self._joints[1]
         found: tuple[float, int, int] = train_episodes(
             self._env, learner, schedule, one, memory, count, float(self._shaping[1])
         )
+        self._joints[1] = memory.retry.performance
         return found
 
 

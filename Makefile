@@ -60,7 +60,7 @@ soak: setup  ## attacks, in about an hour: kills, power cuts, hostile files, bad
 mutants: $(if $(QUICK),$(TESTABLE),$(READY))  ## changes the program in one place at a time: tests must fail; ONLY=name for one, or a package; QUICK=1 for one in each folder, by what make test runs; minutes, a second call goes on
 	$(BIN)/python tests/mutate.py $(if $(ONLY),--only '$(ONLY)') $(if $(QUICK),--quick)
 
-walk: setup  ## a new user's walk: the wheel in a fresh environment, every command of the README; takes minutes
+walk: setup  ## a new user's walk: the wheel in a fresh environment, every command of the README and its pages; takes minutes
 	$(BIN)/python -m pytest -m walk -s
 
 lowest:  ## the quick tests with Python 3.11 and the oldest versions that are allowed, without extras; after changes of kernels

@@ -231,6 +231,8 @@ def _moving_figures(tried: dict[str, Any]) -> dict[str, Any]:
         "settled": tried["settle"]["settled"],
         "seconds": tried["settle"]["median_seconds"],
         "rest": tried["settle"]["rest_error_deg"],
+        "overshoot": tried["settle"]["overshoot_deg"],
+        "late_changes": tried["settle"]["valve_changes_last_second"],
         "changes": tried["settle"]["valve_changes_per_second"],
         "track": [float(np.mean(one["rms_error_deg"])) for one in tried["track"]],
     }

@@ -4,15 +4,18 @@ make constants, or python -m benchmarks constants
 
 The default agents of some arms settle at goals and follow sinusoids, first with all constants as they are. Then each
 constant in turn is changed, and the same agents do the same on the same arms with the same noise. A constant that
-training or compiled code uses is changed in a copy of the package; where training uses it, agents are trained anew. A
-constant *matters* if figures get worse with half or with one and a half times its value: fewer goals settled at, or
-longer times, larger errors or more valve changes, on average over arms and trainings, with 95 % confidence. What was
-measured is kept, so an interrupted benchmark goes on. Settings come from the environment:
+compiled code uses is changed in a copy of the package; agents are not trained anew. Arms change, so some arms are
+moved by the agent of another one. A constant *matters* if figures get worse with half or with one and a half times
+its value: fewer goals settled at, or longer times, larger errors or more valve changes, on average over arms and
+trainings, with 95 % confidence. What was measured is kept, so an interrupted benchmark goes on. Settings come from
+the environment:
 
-PNEUMARM_CONSTANTS_ARMS       names of arms divided by blanks; by default those that are developed on
+PNEUMARM_CONSTANTS_ARMS       names of arms divided by blanks; by default those that are developed on. Of two names
+                              with ">" between them, the agent of the first moves the second
 PNEUMARM_CONSTANTS_SEEDS      of recordings, fits and trainings, "0,1,2"
 PNEUMARM_CONSTANTS_GOALS      goals on each arm, 200
 PNEUMARM_CONSTANTS_ONLY       beginnings of names, such as rest or rest._LOOK, divided by commas; by default all
+PNEUMARM_CONSTANTS_TIMES      "0.5,1.5"; as good as nothing (1e-9) leaves many a rule out
 PNEUMARM_CONSTANTS_PROCESSES  arms that are moved at once, 2
 PNEUMARM_CONSTANTS_FOLDER     where recordings, agents and rows are kept; runs/constants by default
 """
@@ -50,13 +53,13 @@ ARMS = (
     "virtual:seed=3 virtual:seed=5 virtual:seed=31 virtual:wide,seed=12 virtual:wide,seed=61 virtual:wide,seed=76 "
     "virtual:wide,seed=6001 python:benchmarks.strangers:one_10 python:benchmarks.strangers:one_13 "
     "python:benchmarks.strangers:one_22 python:benchmarks.strangers:two_1 python:tests.friction_arms:joint_4 "
-    "virtual:seed=11,muscles=1 virtual:seed=12,pulses=off"
+    "virtual:seed=11,muscles=1 virtual:seed=12,pulses=off "
+    "virtual:seed=1>virtual:seed=2 virtual:seed=2>virtual:seed=3 virtual:seed=4>virtual:seed=1"
 )
 """The arms that are developed on."""
 PACKAGE = Path(pneumarm.__file__).parent
 ACTING = "rest", "two_ways", "following", "correction", "foresight", "predictive", "commands"
 """Modules of the servo that decide how it acts."""
-FACTORS = 0.5, 1.5
 COMPILERS = {"kernel", "inner", "part"}
 FIGURES = "seconds", "rest", "overshoot", "changes", "late", "track"
 """What is compared by ratios, the smaller the better; ``settled`` by differences."""
@@ -137,17 +140,19 @@ def _called(decorator: ast.expr) -> str:
 
 def measure() -> Iterator[str]:
     """Yield a line for each constant."""
-    arms = names_of(environment.text("PNEUMARM_CONSTANTS_ARMS", ARMS), "virtual:seed=")
+    arms = environment.text("PNEUMARM_CONSTANTS_ARMS", ARMS).split()
+    names_of(" ".join(arms).replace(">", " "), "virtual:seed=")
     seeds = environment.seeds("PNEUMARM_CONSTANTS_SEEDS", "0,1,2")
     goals = environment.whole("PNEUMARM_CONSTANTS_GOALS", 200)
     only = environment.words("PNEUMARM_CONSTANTS_ONLY", "all")
+    factors = environment.numbers("PNEUMARM_CONSTANTS_TIMES", "0.5,1.5")
     processes = environment.whole("PNEUMARM_CONSTANTS_PROCESSES", 2)
     folder = environment.folder("PNEUMARM_CONSTANTS_FOLDER", "runs/constants")
     chosen = [one for one in constants() if only == ["all"] or str(one).startswith(tuple(only))]
     if not chosen:
         raise UnusableInput(f"PNEUMARM_CONSTANTS_ONLY: no constant begins with {' or '.join(only)}")
     cases = [(arm, seed) for arm in arms for seed in seeds]
-    for _ in in_processes(partial(prepare, folder), cases, processes):
+    for _ in in_processes(partial(prepare, folder), [(arm.split(">")[0], seed) for arm, seed in cases], processes):
         pass
     rows = Rows(folder / "rows.jsonl", "constant", "factor", "arm", "seed", "goals")
 
@@ -161,7 +166,7 @@ def measure() -> Iterator[str]:
     usual = found(None, 1.0)
     yield f"{'':28}{'value':>9}{'times':>7}{'settled':>17}" + "".join(f"{name:>17}" for name in FIGURES)
     for constant in chosen:
-        for factor in FACTORS:
+        for factor in factors:
             worse, line = compared(found(constant, factor), usual)
             yield f"{constant!s:28}{constant.value:9g}{factor:7g}{line}" + ("  worse" if worse else "")
 
@@ -203,7 +208,8 @@ def prepare(folder: Path, arm: str, seed: int) -> dict[str, Any]:
 
 def moved(folder: Path, constant: Constant | None, factor: float, goals: int, arm: str, seed: int) -> dict[str, Any]:
     """Return how the agent of ``arm`` moves it with a ``constant`` times ``factor``."""
-    case = place_of(folder, arm, seed) / "agent", arm, goals, seed
+    learned, _, other = arm.partition(">")
+    case = place_of(folder, learned, seed) / "agent", other or learned, goals, seed
     if constant is None:
         figures = figures_of(*case)
     elif constant.compiled:
@@ -269,15 +275,11 @@ def in_a_copy(constant: Constant, factor: float, agent: Path, arm: str, goals: i
         shutil.copytree(PACKAGE, copy, ignore=shutil.ignore_patterns("__pycache__"))
         source = (copy / constant.path).read_text(encoding="utf-8")
         (copy / constant.path).write_text(edited(source, constant, factor), encoding="utf-8")
-        root = Path(__file__).parent.parent
-        here = {**os.environ, "PYTHONPATH": os.pathsep.join([temporary, str(root)])}
-        asked = json.dumps([str(agent.resolve()), arm, goals, seed])
-        command = [sys.executable, "-m", "benchmarks.constants", asked]
-        told = subprocess.run(command, env=here, cwd=root, check=True, capture_output=True, text=True).stdout
+        paths = [temporary, str(Path(__file__).parent.parent)]
+        asked = f"figures_of(Path({str(agent.resolve())!r}), {arm!r}, {goals}, {seed})"
+        code = f"import sys; sys.path[:0] = {paths}; from benchmarks.constants import *; print(json.dumps({asked}))"
+        here = {"PATH": os.defpath, "PNEUMARM_CACHE": str(copy.with_name("cache"))}
+        command = [sys.executable, "-c", code]
+        told = subprocess.run(command, env=here, check=True, capture_output=True, text=True).stdout
     figures: dict[str, Any] = json.loads(told.splitlines()[-1])
     return figures
-
-
-if __name__ == "__main__":
-    file, *rest = json.loads(sys.argv[1])
-    print(json.dumps(figures_of(Path(file), *rest)))

@@ -1,5 +1,6 @@
 """A small run of the whole job, made once and used by the tests of everything that comes after it."""
 
+import os
 import signal
 from pathlib import Path
 
@@ -66,8 +67,10 @@ def small_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def pytest_configure() -> None:
     """Start children with a terminal's signals, also in a script's background and under nohup.
 
-    There SIGINT or SIGHUP are ignored, which children inherit; what is handled they do not.
+    There SIGINT or SIGHUP are ignored, which children inherit; what is handled they do not. Nor does any of them open
+    a browser, wherever pytest was started.
     """
+    os.environ["BROWSER"] = "true"  # a program that does nothing
     for number, handler in ((signal.SIGINT, signal.default_int_handler), (signal.SIGHUP, lambda *_: None)):
         if signal.getsignal(number) is signal.SIG_IGN:
             signal.signal(number, handler)

@@ -30,7 +30,7 @@ DOCUMENTED = {
     *("numpy", "numpy.typing", "numpy.lib.stride_tricks", "onnx", "onnx.helper", "onnx.numpy_helper"),
     *("platformdirs", "psutil", "pyarrow", "pyarrow.parquet", "pygame", "rerun", "tensorboardX", "uvicorn"),
     *("rich.console", "rich.logging", "rich.markdown", "rich.progress", "rich.status", "rich.table", "rich.text"),
-    *("safetensors", "safetensors.numpy", "serial", "serial.tools", "serial.tools.list_ports"),
+    *("safetensors", "safetensors.numpy", "scipy.spatial", "serial", "serial.tools", "serial.tools.list_ports"),
     *("sqlalchemy", "sqlalchemy.dialects.mysql", "sqlalchemy.dialects.postgresql", "sqlalchemy.exc"),
     *("stable_baselines3", "stable_baselines3.common.vec_env"),
     *("starlette.applications", "starlette.requests", "starlette.responses", "starlette.routing"),

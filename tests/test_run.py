@@ -134,7 +134,7 @@ def test_a_folder_with_something_else_in_it_is_left_alone(tmp_path: Path) -> Non
 def test_nothing_is_left_behind_by_settings_that_cannot_be_used(tmp_path: Path) -> None:
     with pytest.raises(UnusableInput, match="expected virtual"):
         Run(tmp_path / "run", replace(SMALL, arm="wirtual")).do()
-    with pytest.raises(UnusableInput, match="expected `int` >= 1000"):
+    with pytest.raises(UnusableInput, match="expected a whole number, 1000 or more"):
         replace(SMALL, transitions=100)
     with pytest.raises(UnusableInput, match="1 joint"):
         Run(tmp_path / "run", replace(SMALL, joints=2)).do()

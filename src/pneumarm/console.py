@@ -75,6 +75,13 @@ def table(header: Sequence[str], rows: Sequence[Sequence[Any]], title: str = "")
     return built
 
 
+def percent(share: Any) -> str:
+    """Return a ``share`` for people, or one a joint: ``10.5 %``; a dash where it is not known."""
+    if isinstance(share, list | tuple):
+        return ", ".join(map(percent, share))
+    return "-" if share is None or not math.isfinite(share) else f"{100 * share:.3g} %"
+
+
 def peak_memory(children: bool = False) -> float:
     """Return the most memory that this process has held, or the largest of its ``children`` that have ended [MB].
 

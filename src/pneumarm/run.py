@@ -69,7 +69,7 @@ RECORDED = "recorded.svg"
 """A picture that plays: how the arm moved at the end of its recording."""
 
 _PLANNED = 40  # movements, by default
-_DRAWN = {"transfer": ("learned",), "settle": ("learned", "moved")}
+_DRAWN = {"transfer": ("learned",), "settle": ("learned", "moved", "reached")}
 """Parts of the report that can be drawn once a stage begins: nothing that it says in them changes any more."""
 
 
@@ -100,7 +100,7 @@ class RunSettings(LearnSettings):
     enough: EnoughSettings = field(default_factory=EnoughSettings)
     """When more would not help."""
     test_episodes: PositiveInt = 10_000
-    """Movements of the test in simulation (thesis section 5.2)."""
+    """Movements tested in simulation (thesis section 5.2)."""
     bound_episodes: NonNegativeInt | None = None
     """Movements to goals that are planned, as a bound.
 

@@ -1,6 +1,7 @@
 """Settings that a person chooses: every field says by its type which values are valid, in one way."""
 
 import math
+import re
 from collections.abc import Iterator, Mapping
 from functools import cache
 from inspect import get_annotations
@@ -96,10 +97,41 @@ def _expected(value: Any, kind: Any) -> str | None:
     try:
         msgspec.convert(value, kind, strict=True)
     except msgspec.ValidationError as error:
-        return ", ".join(_choices(kind)) or str(error).removeprefix("Expected ")
+        return ", ".join(_choices(kind)) or in_words(error)
     except TypeError:  # a type that msgspec does not know
         return None
     return None if _is_finite(value) else "finite numbers"
+
+
+_KINDS = {"int": "a whole number", "float": "a number", "str": "a text", "bool": "true or false", "object": "a table"}
+_BOUNDS = {">=": "{} or more", "<=": "{} or less", ">": "more than {}", "<": "less than {}", None: "{}"}
+_SAID = re.compile(
+    r"Expected `(?P<kind>\w+)(?: \| null)?`(?: (?:of length )?(?P<sign>[<>]=?)? ?(?P<bound>[-+.\de]+))?"
+    r"(?:, got [^$]+?)?(?: - at `\$(?P<place>.+)`)?"
+)
+
+
+def in_words(error: msgspec.ValidationError) -> str:
+    """Return what was expected as ``error`` says it, in words: "a whole number, 1 or more"."""
+    found = _SAID.fullmatch(str(error))
+    if found is None:
+        return str(error).removeprefix("Expected ")
+    kind, sign, bound, place = found.groups()
+    least = "" if bound is None else _BOUNDS[sign].format(bound.removesuffix(".0"))
+    if kind == "array":
+        said = f"{least} values" if least else "a list of values"
+    else:
+        said = f"{_KINDS.get(kind, kind)}{least and ', '}{least}"
+    return said + _place(place)
+
+
+def _place(place: str | None) -> str:
+    """Return where msgspec says that something is: ``[1]`` is the second value of several, ``.name`` a field."""
+    if place is None:
+        return ""
+    if number := re.fullmatch(r"\[(\d+)\]", place):
+        return f", as value {int(number[1]) + 1}"
+    return f", at {place.removeprefix('.')}"
 
 
 def _choices(kind: Any) -> Iterator[str]:

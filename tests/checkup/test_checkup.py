@@ -386,9 +386,9 @@ def test_a_calibration_finds_scales_and_zeros():
     ("known", "message"),
     [
         ({"angles": ((3, -3),)}, "a lower and a higher"),
-        ({"supply": 60.0}, "`float` <= 10.0"),
-        ({"supply": np.nan}, "`float` >= 0.1"),
-        ({"counts_per_bar": 0.0}, "`float` > 0.0"),
+        ({"supply": 60.0}, "a number, 10 or less"),
+        ({"supply": np.nan}, "a number, 0.1 or more"),
+        ({"counts_per_bar": 0.0}, "a number, more than 0"),
         ({"supply": 1.0, "counts_per_bar": 166.0}, "not both"),
         ({"angles": ((-3, 3),), "counts_per_degree": 4.0}, "not both"),
     ],

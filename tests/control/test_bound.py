@@ -150,7 +150,7 @@ def test_few_movements_and_several_joints_have_their_table(arm: str, capsys: pyt
 
 
 def test_settings_are_checked() -> None:
-    with pytest.raises(UnusableInput, match="`int` >= 1"):
+    with pytest.raises(UnusableInput, match="a whole number, 1 or more"):
         BoundSettings(episodes=0)
     with pytest.raises(UnusableInput, match="switches"):
         PlanSettings(switches=-1)

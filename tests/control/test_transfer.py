@@ -364,8 +364,8 @@ def test_the_mean_is_taken_over_the_share_that_was_asked_for(agent: Agent, tmp_p
 @pytest.mark.parametrize(
     ("settings", "words"),
     [
-        ({"episodes": -1}, "episodes cannot be -1; expected `int` >= 0"),
-        ({"test_episodes": 0}, "test_episodes cannot be 0; expected `int` >= 1"),
+        ({"episodes": -1}, "episodes cannot be -1; expected a whole number, 0 or more"),
+        ({"test_episodes": 0}, "test_episodes cannot be 0; expected a whole number, 1 or more"),
         ({"learning_rate": 2.0}, "learning_rate cannot be"),
         ({"averaged": 1.5}, "averaged"),
     ],

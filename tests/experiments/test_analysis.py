@@ -13,7 +13,7 @@ from scipy import stats
 from pneumarm.errors import UnusableInput
 from pneumarm.experiments.design import WantedFactor, analyse_table, assign, orthogonal_array, thesis_design
 from pneumarm.experiments.design.anova import anova, smallest
-from pneumarm.experiments.design.best import Criterion, confirm, derive, level_at, predict
+from pneumarm.experiments.design.best import Aim, confirm, derive, level_at, predict
 from pneumarm.experiments.design.distributions import f_tail, half_normal_quantile, incomplete_beta, t_quantile
 from pneumarm.experiments.design.effect_plots import half_normal_figure
 from pneumarm.experiments.design.effects import effects
@@ -174,7 +174,7 @@ def test_the_derivation_finds_the_best_of_additive_results(order: list[int], rai
     weights = np.array([2.0 ** -order[i] * (1 if raises[i] else -1) for i in range(5)])
     results = sum(w * design.array.column(f.column) for w, f in zip(weights, design.factors, strict=True))
     found = effects(design.array, results)
-    best = derive(design, [Criterion("mean", found, True)])
+    best = derive(design, [Aim("mean", found, True)])
     assert best.levels == {f.label: int(up) for f, up in zip(design.factors, raises, strict=True)}
     assert [step.factor for step in best.steps] == [design.factors[order.index(k)].label for k in range(5)]
 
@@ -187,12 +187,12 @@ def test_interactions_decide_factors_that_matter_less() -> None:
     a, ab = design.array.column(1), design.array.column(3)
     for wanted in (0, 1):
         results = 10.0 * a + 5.0 * (ab == wanted) + 0.1 * design.array.column(2) + 0.01 * design.array.column(4)
-        best = derive(design, [Criterion("mean", effects(design.array, results), True)])
+        best = derive(design, [Aim("mean", effects(design.array, results), True)])
         assert best.levels == {"a": 1, "b": 1 ^ wanted, "c": 1}
         assert {step.factor: step.column for step in best.steps}["b"] == 3
         # An interaction that ranks above both of its factors waits until one of them is fixed.
         results = 10.0 * (ab == wanted) + 5.0 * a + 0.1 * design.array.column(4)
-        best = derive(design, [Criterion("mean", effects(design.array, results), True)])
+        best = derive(design, [Aim("mean", effects(design.array, results), True)])
         assert (best.levels["a"], best.levels["b"]) == (1, 1 ^ wanted)
 
 

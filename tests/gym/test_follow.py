@@ -136,7 +136,7 @@ def test_mistakes_are_told(env: ArmFollow) -> None:
         with pytest.raises(UnusableInput, match=words):
             env.reset(options=options)  # type: ignore[arg-type]
     for arguments, words in (
-        ({"seconds": 0}, "seconds cannot be 0; expected `float` > 0"),
+        ({"seconds": 0}, "seconds cannot be 0; expected a number, more than 0"),
         ({"preview": (20.0,)}, r"preview cannot be \(20.0,\)"),
         ({"reference": "sine:1Hz,60deg"}, "asks joint 1"),
         ({"render_mode": "ascii"}, "render_mode"),

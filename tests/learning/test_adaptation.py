@@ -291,7 +291,7 @@ def test_an_agent_that_earns_less_is_taken_back(agent: PolicyAgent, adapted: byt
         np.testing.assert_array_equal(mine.output_weights, was.output_weights)
     assert adapting.events[-1].what == "rolled back"
     assert not adapting.is_due()
-    assert "taken back" in sentences(adapting.events, adapting.quantities)[-1]
+    assert "rolled back" in sentences(adapting.events, adapting.quantities)[-1]
 
 
 def test_an_agent_that_earns_no_less_becomes_the_one_to_go_back_to(

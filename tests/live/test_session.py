@@ -193,7 +193,7 @@ def test_an_arm_whose_page_is_silent_holds_then_is_vented(played: Played) -> Non
     )
     (_, first, _), (_, second, why), (_, third, after) = played.modes
     assert (first, second, third) == ("moving", "moving", "relaxed")
-    assert "not heard" in why
+    assert "lost its connection" in why
     assert "vented" in after
     assert played.virtual.pressure.max() < 5e3
 

@@ -40,7 +40,7 @@ def test_a_finding_is_a_sentence(
 
 
 def test_the_guard_says_what_it_prevented() -> None:
-    assert prevented(Interventions()) == "had nothing to prevent"
+    assert prevented(Interventions()) == "no interventions"
     assert (
         prevented(Interventions(pressure=3, late=1))
         == "prevented 3 x pressure at its limit, 1 x command came too late"

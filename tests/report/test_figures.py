@@ -11,14 +11,13 @@ from pneumarm.report.figures.adaptation import CurveMark, adaptation_curves
 from pneumarm.report.figures.baselines import Baseline, baselines
 from pneumarm.report.figures.coverage import cells, new_share, projections
 from pneumarm.report.figures.displacement import against_displacement
-from pneumarm.report.figures.episodes import distributions
 from pneumarm.report.figures.film import movement
 from pneumarm.report.figures.importance import input_importance
 from pneumarm.report.figures.isoplots import isoplot
 from pneumarm.report.figures.marked import marked_rows
 from pneumarm.report.figures.propagation import error_propagation, expectation
 from pneumarm.report.figures.residues import Classification, residue_by_class, residues
-from pneumarm.report.figures.training import spread_of_agents, training_curves
+from pneumarm.report.figures.training import training_curves
 from pneumarm.report.figures.transfer import transfer_curves
 from pneumarm.report.sections import RunData, all_sections, classifications, levels, phases_of
 from pneumarm.report.style import svg
@@ -53,7 +52,6 @@ def figures_of(n, joints):
         "isoplot": isoplot(real, simulated, spec),
         "propagation": error_propagation(q.propagation, spec),
         "importance": input_importance(q.weights, q.inputs, q.outputs),
-        "distributions": distributions(test.reward, test.actions, test.all_switches, won),
         "transfer": transfer_curves(phases, levels(test)),
         "displacement": against_displacement(*far, spec),
         "baselines": baselines(*(builders.baselines(min(n, 10)) if n else ([], {}))),
@@ -65,7 +63,6 @@ def figures_of(n, joints):
         made["shaping"] = training_curves(t.curves, t.columns, t.evaluated, t.chosen, spec)
         learned = t.curves[:, :, [0, 3, 4]]
         made["learning"] = training_curves(learned, ("episodes", "reward", "success"), t.evaluated, t.chosen, spec)
-        made["spread"] = spread_of_agents(t.reward, t.success, t.chosen)
     return made
 
 
@@ -217,16 +214,9 @@ def test_transfer_curve_passes_through_the_mean_and_marks_the_simulation():
     assert any(np.allclose(line.get_ydata(), 12.5) for line in figure.axes[0].lines if len(line.get_ydata()))
 
 
-def test_the_alternative_of_distributions_holds_their_numbers():
-    test = builders.run().test
-    alt = distributions(test.reward, test.actions, test.all_switches, test.success).alt
-    assert f"{test.success.mean():.2%}" in alt
-    assert f"median {np.median(test.actions):g}" in alt
-
-
 def test_a_run_without_anything_has_its_results_only():
     sections = all_sections(RunData(SPEC, {}, test=movements(0)))
-    assert [s.title for s in sections] == ["Results", "Test in the simulation"]
+    assert [s.title for s in sections] == ["The thesis' task", "Reward, and the thesis' figures beside ours"]
 
 
 def test_rewards_far_below_are_cut_off_but_never_those_of_the_best_method():
@@ -263,5 +253,5 @@ def test_the_adaptation_is_told_with_its_figures():
     first = np.sqrt(adapted.squares[:100, 1, 0].mean())
     assert f"angle {first:.2f} in the first hundred" in words
     assert words.endswith(
-        "change noticed after movement 46; new version after movement 60; version taken back after movement 100."
+        "change noticed after movement 46; new version after movement 60; version rolled back after movement 100."
     )

@@ -12,12 +12,14 @@ from pneumarm.control import save_history
 from pneumarm.errors import UnusableInput
 from pneumarm.report.data import CoverageData, Demonstration, MovingData, QualityData, TrainingData
 from pneumarm.report.files import TEST, save_demonstration, write_spec
+from pneumarm.report.front import headline, lights
 from pneumarm.report.ledger import beside_thesis, bound_table, ledger
 from pneumarm.report.page import Section, Table, render
 from pneumarm.report.run_report import read_run, run_page, write_report
-from pneumarm.report.sections import RunData, adapted, moving, overview
+from pneumarm.report.sections import RunData, adapted, all_sections, followed, moving, overview
 from pneumarm.task import Movements, read_episodes, write_episodes
 from pneumarm.task.movements import COLUMNS, movements
+from test_words import offences
 
 VOID = {"meta", "img", "source", "link", "br", "hr", "input"}
 MOST_BYTES = 6e6
@@ -47,6 +49,9 @@ class Page(HTMLParser):
         self.text.append(data)
 
 
+FEW = builders.transfer(counts=(15, 30, 15))
+
+
 @pytest.fixture(scope="module")
 def html():
     return run_page(builders.run())
@@ -69,7 +74,7 @@ def test_page_asks_nothing_of_any_network(html, page):
 
 def test_every_picture_has_a_caption_and_a_text_alternative(page):
     pictures = [attrs for tag, attrs in page.elements if tag == "img"]
-    assert len(pictures) == 19  # with the one that plays
+    assert len(pictures) == 15  # with the one that plays
     assert all(len(attrs["alt"]) > 60 for attrs in pictures)
     tags = [tag for tag, _ in page.elements]
     assert tags.count("figcaption") == tags.count("figure") == len(pictures) + tags.count("table")
@@ -80,16 +85,22 @@ def test_all_alternatives_hold_computed_numbers_and_captions_name_the_thesis(htm
         assert re.search(r"\d", attrs["alt"]), attrs["alt"]
         assert "nan" not in attrs["alt"]
     captions = re.findall(r"<img[^>]*>\s*</div>\s*<figcaption[^>]*>(.*?)</figcaption>", html, re.DOTALL)
-    assert len(captions) == 18
+    assert len(captions) == 14
     assert all("thesis" in caption for caption in captions)
 
 
-def test_ids_are_unique_and_the_contents_lead_to_every_section(page):
+def test_ids_are_unique_and_links_lead_to_sections(html, page):
     assert len(page.ids) == len(set(page.ids))
     links = [attrs["href"][1:] for tag, attrs in page.elements if tag == "a"]
-    assert links == [attrs["id"] for tag, attrs in page.elements if tag == "section"]
+    assert set(links) <= {attrs["id"] for tag, attrs in page.elements if tag == "section"}
+    assert len(links) == 3  # of the lights
+    assert "<nav" not in html
     referred = [attrs["aria-labelledby"] for _, attrs in page.elements if "aria-labelledby" in attrs]
     assert set(referred) <= set(page.ids)
+
+
+def test_every_word_of_it_is_native(page):
+    assert offences(" ".join(" ".join(page.text).split())) == []
 
 
 def test_page_stays_small(html):
@@ -133,9 +144,10 @@ def test_figures_of_joints_are_told_apart():
     moved = {"track": [{"frequency_hz": 0.5, "amplitude_deg": 20.0, "rms_error_deg": [1.9, 0.68]}]}
     time = np.linspace(0, 1, 31)
     angle = np.stack([np.full(31, 500.0), np.full(31, 500.5)], axis=1)
-    section = moving(MovingData(time, angle, angle), moved, run.spec)
-    assert section.tables[0].header == ("sinusoid", "RMS error of joint 1 [°]", "RMS error of joint 2 [°]")
-    assert section.tables[0].rows == [("0.5 Hz, 20°", "1.90", "0.68")]
+    (tracked,) = followed(moved, run.spec)
+    assert tracked.tables[0].header == ("sinusoid", "RMS error of joint 1 [°]", "RMS error of joint 2 [°]")
+    assert tracked.tables[0].rows == [("0.5 Hz, 20°", "1.90", "0.68")]
+    section = moving(MovingData(time, angle, angle), run.spec)
     names = dict(re.findall(r'y="([\d.]+)">(joint \d)<', str(section.figures[0].figure)))
     assert sorted(names.values()) == ["joint 1", "joint 2"]
     first, second = sorted(map(float, names))
@@ -145,21 +157,80 @@ def test_figures_of_joints_are_told_apart():
     assert re.fullmatch(f"{both} measured; {both} by eq. 3.7", rows["std of error after 1 s, angle [°]"])
 
 
-def test_a_run_that_settles_opens_with_the_arm_as_it_moves():
+SETTLE = {
+    "tolerance_deg": 1.0,
+    "settled": 0.975,
+    "movements": 40,
+    "median_seconds": 0.4,
+    "rest_error_deg": 0.1,
+    "overshoot_deg": 0.75,
+    "valve_changes_per_second": 7.0,
+    "air_litres_per_movement": None,
+}
+
+
+def settled(**changes):
     run = builders.run(small=True)
-    time = np.linspace(0, 1, 31)
-    angle = np.full((31, 1), 500.0)
-    settle = {"tolerance_deg": 1.0, "settled": 1.0, "movements": 40, "median_seconds": 0.4, "rest_error_deg": 0.1}
-    settle |= {"valve_changes_per_second": 7.0, "air_litres_per_movement": None}
-    moved = replace(run, moving=MovingData(time, angle, angle), results={**run.results, "settle": settle})
-    made = run_page(moved)
-    places = [
-        made.index(part)
-        for part in ("settles within", 'id="figure-1"', "<nav", "the thesis' measure".replace("'", "&#39;"))
-    ]
+    time, angle = np.linspace(0, 1, 31), np.full((31, 1), 500.0)
+    return replace(run, moving=MovingData(time, angle, angle), results={**run.results, "settle": SETTLE | changes})
+
+
+def test_a_run_that_settles_opens_with_large_figures_the_arm_and_three_questions():
+    made = run_page(settled())
+    order = ("97.5 %", "0.40 s", "0.10°", "0.8°", 'id="figure-1"', "Is my data enough?", "Is the simulation good?",
+             "Is anything wrong with the arm?", "<details>", "The thesis&#39; task", "Reward, and")  # fmt: skip
+    places = [made.index(part) for part in order]
     assert places == sorted(places)
-    assert made.count("settles within") == 1
     assert made.count('id="figure-1"') == 1
+    assert made.count("normal: ") == 4
+
+
+def test_only_the_front_of_a_run_is_unfolded():
+    sections = all_sections(settled())
+    assert [one.title for one in sections if not one.folded] == ["How it moves", "The thesis' task"]
+    assert "not trained for that" in next(one for one in sections if one.title == "The thesis' task").text[0]
+
+
+def test_results_without_overshoot_have_three_figures():
+    made = settled()
+    del made.results["settle"]["overshoot_deg"]
+    assert len(headline(made)) == 3
+
+
+def test_an_agent_that_reaches_opens_with_how_it_reaches():
+    run = builders.run(small=True)
+    first = headline(run)[0]
+    assert first.name == f"reached, of {run.transfer.after.n} goals on the arm"
+    assert first.value == f"{100 * run.transfer.after.success.mean():.4g} %"
+    assert headline(RunData(ArmSpec(), {})) == []
+
+
+def test_lights_say_what_is_known_and_lead_to_more():
+    unknown = lights(RunData(ArmSpec(), {}))
+    assert [one.good for one in unknown] == [None, None, None]
+    results = {
+        "collect": {"enough": {"verdict": "enough: the second half lowers the error not at all"}, "findings": []},
+        "simulation": {"relative_error": {"angle": 0.1}},
+    }
+    assert [(one.good, one.answer) for one in lights(RunData(ArmSpec(), results))] == [
+        (True, "Yes"),
+        (True, "Yes"),
+        (True, "No"),
+    ]
+    results["collect"] = {"enough": {"verdict": "collect as much again: it helps"}, **builders.found(builders.FOUND)}
+    results["simulation"]["relative_error"]["angle"] = [0.1, 0.4]
+    bad = lights(RunData(ArmSpec(), results))
+    assert [one.good for one in bad] == [False, False, False]
+    assert "60%" in bad[1].words
+    assert bad[2].words == "Stuck valve: the inlet is stuck closed (joint 1, muscle 2, collecting)."
+    titles = {section.title for section in all_sections(builders.run(small=True))}
+    assert {one.title for one in bad} <= titles
+
+
+def test_few_movements_are_not_averaged_in_a_figure():
+    many, few = builders.run(), builders.run(small=True)
+    titles = [[section.title for section in all_sections(run)] for run in (many, replace(few, transfer=FEW))]
+    assert ["Transfer to the arm" in one for one in titles] == [True, False]
 
 
 def test_comparison_names_ours_and_the_thesis():
@@ -269,14 +340,13 @@ def test_report_of_a_run_without_transfer(tmp_path):
     builders.episodes(1, on_arm=False).save(tmp_path / TEST)
     page = Page(write_report(tmp_path).read_text(encoding="utf-8"))
     assert [a["id"] for t, a in page.elements if t == "section"] == [
-        "section-results",
-        "section-test-in-the-simulation",
+        "section-the-thesis-task",
+        "section-reward-and-the-thesis-figures-beside-ours",
     ]
 
 
 def test_run_whose_arm_did_nothing_can_be_reported():
     run = RunData(ArmSpec(), {}, test=movements(0), transfer=builders.transfer(counts=(0, 0, 0)))
-    assert "No episodes were done on the arm." in run_page(run)
     assert "nan" not in " ".join(Page(run_page(run)).text)
 
 

@@ -53,6 +53,8 @@ PAGES = {
     "site": "site/index.html",
 }
 
+UNFOLD = "[...document.querySelectorAll('details')].map((one) => (one.open = true)).length"
+"""Opens what is folded on a page, and says how many parts that are."""
 FIGURES = ("reward", "actions", "switches", "episodes", "success_rate", "gain", "met", "learning success_rate")
 """Of a row of an experiment."""
 
@@ -161,6 +163,8 @@ def test_a_page_fits_and_can_be_read(
 ) -> None:
     page = shown(browser, page_named(pages, name), width, color_scheme=scheme)
     keep(page, f"{name}-{width}-{scheme}")
+    if page.evaluate(UNFOLD):
+        keep(page, f"{name}-{width}-{scheme}-unfolded")
     assert too_wide(page) <= 0
     size, text = smallest_text(page)
     assert size >= READABLE, text
@@ -182,6 +186,7 @@ def test_a_page_fits_and_can_be_read(
 @pytest.mark.parametrize("name", PAGES)
 def test_on_a_desk_nothing_on_a_page_scrolls_sideways(browser: Browser, pages: dict[str, Path], name: str) -> None:
     page = shown(browser, page_named(pages, name), 1280)
+    page.evaluate(UNFOLD)
     hidden = page.evaluate(
         "[...document.querySelectorAll('.scroll')].filter((one) => one.scrollWidth > one.clientWidth)"
         ".map((one) => one.textContent.trim().slice(0, 80))"

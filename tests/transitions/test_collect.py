@@ -230,7 +230,7 @@ def test_other_settings_or_another_arm_are_refused_before_anything_moves(tmp_pat
     assert arm.reads == 0
     with pytest.raises(UnusableInput, match="longest_hold cannot be 0"):
         CollectSettings(longest_hold=0)
-    with pytest.raises(UnusableInput, match=r"inflate cannot be -1.0; expected `float` >= 0.0"):
+    with pytest.raises(UnusableInput, match=r"inflate cannot be -1.0; expected a number, 0 or more"):
         CollectBegin(inflate=-1.0)
 
 

@@ -276,7 +276,7 @@ def test_mistakes_are_told(store, tmp_path):
         filter_transitions(store, Window(1, 3), hold_out=1.0)
     with pytest.raises(UnusableInput, match="cannot be numbered"):
         filter_transitions(store, Window(1, 3), GridSettings(angle_bins=10**6, pressure_bins=10**6))
-    with pytest.raises(UnusableInput, match="per_cell cannot be 0; expected `int` >= 1"):
+    with pytest.raises(UnusableInput, match="per_cell cannot be 0; expected a whole number, 1 or more"):
         GridSettings(per_cell=0)
     with (
         Store.create(tmp_path / "e.db", ArmSpec()) as empty,

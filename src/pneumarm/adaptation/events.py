@@ -46,7 +46,7 @@ def sentences(events: Sequence[Event], quantities: Sequence[str]) -> list[str]:
             )
         elif event.what == "rolled back":
             lines.append(
-                f"version {found['taken_back']} taken back after movement {event.movement}: its movements "
+                f"version {found['taken_back']} rolled back after movement {event.movement}: its movements "
                 f"earned {found['reward_after']:.2f} instead of {found['reward_before']:.2f}; again version "
                 f"{event.version}"
             )

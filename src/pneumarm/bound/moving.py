@@ -50,9 +50,9 @@ class MovingBoundSettings(Settings):
     hold: Annotated[float, Meta(ge=1, le=60)] = 2.0
     """For how long each is held [s]."""
     frequencies: tuple[Annotated[float, Meta(gt=0, le=100)], ...] = (0.1, 0.25, 0.5, 1.0, 2.0)
-    """Of the sinusoids that are followed [Hz]."""
+    """Frequencies of the sinusoids that are followed [Hz]."""
     amplitude: Annotated[float, Meta(gt=0, lt=360)] = 20.0
-    """Of the sinusoids about the middle of the goals; less where the arm does not go so far [degrees]."""
+    """Amplitude of the sinusoids about the middle of the goals; less where the arm does not go so far [degrees]."""
     seconds: Annotated[float, Meta(ge=1, le=600)] = 5.0
     """For how long each is followed [s]."""
     sweeps: Annotated[int, Meta(ge=1, le=1000)] = 3

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from pneumarm.analysis import analyse
 from pneumarm.commands.common import AnyStore, Json
-from pneumarm.console import say, show, table
+from pneumarm.console import percent, say, show, table
 from pneumarm.files import make_folder, require_output
 from pneumarm.progress import progress
 from pneumarm.report.run_report import write_analysis
@@ -36,14 +36,18 @@ def analyse_(db: AnyStore, sim: Path, /, *, out: Path, json: Json = False) -> No
     for line in analysis.figures.get("remarks", ()):
         say(line)
     errors = analysis.figures["held_out"]
-    rows = [(_WORDS[name], *figures.values()) for name, figures in errors.items()]
+    rows = [
+        (_WORDS[name], *(map(percent, figures.values()) if name == _SHARE else figures.values()))
+        for name, figures in errors.items()
+    ]
     header = ("one-step error, held out", *(name.replace("_", " ") for name in errors["std"]))
     show(analysis.figures, json, lambda: [table(header, rows)])
 
 
+_SHARE = "relative_error"
 _WORDS = {
     "std": "standard deviation",
-    "relative_error": "relative to the change",
+    _SHARE: "of the change",
     "mean": "mean",
     "slope": "slope, predicted",
     "calibration": "slope, observed",

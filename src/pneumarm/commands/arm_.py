@@ -50,7 +50,7 @@ def check_(
 ) -> None:
     """Move an arm gently, a muscle at a time, and say what is wrong with it. Its joints must be free to move.
 
-    What is found wrong is told, and the exit code is 0 all the same unless ``--strict`` is given: the check was done.
+    The exit code is 0 whatever it finds, because the check was done; with ``--strict`` it is 1 if anything is wrong.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def check_(
     strict
         Exit with 1 where something is wrong with the arm, for scripts.
     seed
-        Of a virtual arm's noise.
+        Random seed of a virtual arm's noise.
     """
     if out is not None:
         require_output(out)
@@ -153,7 +153,7 @@ def calibrate_(
     counts_per_bar
         ... or counts of the pressure sensors per bar, by their data sheet.
     seed
-        Of a virtual arm's noise.
+        Random seed of a virtual arm's noise.
     """
     require_folder(out)
     known = Known(angles, counts_per_degree, supply, counts_per_bar)
@@ -212,7 +212,7 @@ def errors_(
     out
         Page to write, errors.html.
     seed
-        Of the virtual arm; 0 is the nominal one.
+        Which virtual arm; 0 is the nominal one.
     """
     from pneumarm.appendix_a.errors_page import errors_page
     from pneumarm.appendix_a.playing_errors import play_errors
@@ -290,7 +290,7 @@ def _sensed(reading: Reading, spec: ArmSpec) -> str:
     degrees, bar = spec.degrees(reading.angle), spec.bar(reading.pressure)
     muscles = range(2 if spec.pressure_sensors else 0)
     joints = [
-        f"joint {j + 1}: {degrees[j]:6.1f}° ({reading.angle[j]:4.0f})"
+        f"joint {j + 1}: {degrees[j]:z6.1f}° ({reading.angle[j]:4.0f})"
         + "".join(f"  {bar[j, m]:5.2f} bar ({reading.pressure[j, m]:4.0f})" for m in muscles)
         for j in range(spec.joints)
     ]
@@ -346,7 +346,7 @@ def emulate_(arm: str, /, *, link: Path | None = None, seed: int = 0, json: Json
     link
         Path of a symbolic link to the port, for a name that stays the same; removed at the end.
     seed
-        Of the arm's noise.
+        Random seed of the arm's noise.
     json
         Print one JSON object on stdout, once the port can be used, and nothing else there.
     """

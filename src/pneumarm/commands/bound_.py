@@ -45,10 +45,10 @@ def bound_(
         A simulation of this arm: goals are drawn from its range, and a third planner uses it. Without one, a short
         collection measures the range of goals.
     agent
-        The file of an agent that settles, holds and tracks: then it is said what that could do at best, and whether
-        noise, the learner or the simulation's error keeps it from there.
+        The file of an agent that settles, holds and tracks. The command then reports what it could do at best, and
+        whether noise, the learner or the simulation's error keeps it from that.
     seed
-        Of the begin states, the goals and the noise; those of ``pneumarm transfer`` with the same seed.
+        Random seed of begin states, goals and noise: as those of ``pneumarm transfer`` with the same seed.
     """
     opened = open_arm(arm, seed)
     if not isinstance(opened, VirtualArm):
@@ -77,7 +77,7 @@ def bound_(
     once = result["open_loop"]
     proven = f"{settings.episodes - once['unproven_plans']} of {settings.episodes} plans in open loop"
     most = (
-        f"Of plans with at most {settings.plan.switches} switches none earn more than {once['at_most']:.2f} in the "
+        f"No plans with at most {settings.plan.switches} switches earn more than {once['at_most']:.2f} in the "
         f"mean in open loop; {proven} are proven to be the best."
     )
     title = f"{arm}, {settings.episodes} movements, 95 % intervals"

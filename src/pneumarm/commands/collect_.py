@@ -11,6 +11,9 @@ from pneumarm.progress import progress
 from pneumarm.simulation.enough import EnoughSettings, collect_enough
 from pneumarm.transitions import FEWEST_TRANSITIONS, CollectResult, CollectSettings, Store, collect, require_enough
 
+_COMPRESSED = 1.1
+"""So much above the limit is normal: the joint that moves compresses the air in closed muscles."""
+
 
 def collect_(
     arm: str,
@@ -76,7 +79,18 @@ def collect_(
         say(judged["verdict"])
     for line in complaints(results, "collecting"):
         say(line)
-    show(results, json, lambda: [table(("collected", ""), _rows(result, opened.spec))])
+    above = _above_limit(float(opened.spec.bar(result.peak_pressure).max()), opened.spec)
+    show(results, json, lambda: [table(("collected", ""), _rows(result, opened.spec)), *above])
+
+
+def _above_limit(peak: float, spec: ArmSpec) -> list[str]:
+    """Return what a ``peak`` [bar] above the limit means; nothing where it is not above, or not measured."""
+    if not spec.pressure_sensors or peak <= spec.max_pressure:
+        return []
+    words = f"The highest pressure, {peak:.2f} bar, is above the limit of {spec.max_pressure:g} bar. "
+    if peak <= _COMPRESSED * spec.max_pressure:
+        return [f"{words}That is normal: inlets close at the limit, but a moving joint compresses closed muscles."]
+    return [f"{words}A moving joint compresses closed muscles, but rarely so much: call pneumarm arm check."]
 
 
 def _rows(result: CollectResult, spec: ArmSpec) -> list[tuple[str, str]]:

@@ -1,12 +1,15 @@
 """What the commands share."""
 
 import math
+import os
 import shlex
+import sys
+import webbrowser
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from time import monotonic
-from typing import Annotated, Any
+from typing import Annotated, Any, TextIO
 
 import numpy as np
 from cyclopts import Parameter, Token
@@ -46,10 +49,6 @@ Monitoring = Annotated[
     ),
 ]
 """What is done about faults of an arm that are found while it moves."""
-COLUMNS = ("episodes", "reward", "success_rate", "actions", "switches")
-"""Figures of movements that tables show."""
-HEADINGS = ("movements", *(name.replace("_", " ") for name in COLUMNS[1:]))
-"""What they are called there."""
 _EXAMPLE = 10.0  # degrees
 _LOOK = 0.1  # s between two lines that a person can read
 
@@ -59,6 +58,16 @@ def move_command(controller: Path, arm: str, spec: ArmSpec, goal_range: Any) -> 
     angles = (_EXAMPLE if low <= _EXAMPLE <= high else (low + high) / 2 for low, high in spec.degrees(goal_range))
     goal = ",".join(f"{angle:.3g}deg" for angle in angles)
     return f"`{shlex.join(['pneumarm', 'move', str(controller), '--arm', arm, goal])}`"
+
+
+def open_page(address: str, wanted: bool | None, said_on: TextIO) -> None:
+    """Open ``address`` in the browser if that is ``wanted``, or by default if somebody is there to see it.
+
+    That is where there is a screen, what is ``said_on`` is a terminal, and no CI runs this.
+    """
+    graphical = sys.platform in ("win32", "darwin") or "DISPLAY" in os.environ or "WAYLAND_DISPLAY" in os.environ
+    if wanted or (wanted is None and graphical and said_on.isatty() and "CI" not in os.environ):
+        webbrowser.open(address)
 
 
 @contextmanager
@@ -77,7 +86,7 @@ def live(spec: ArmSpec) -> Iterator[Seen]:
                 return
             shown = now
             joints = zip(spec.degrees(reading.angle), spec.degrees(goal), spec.bar(reading.pressure), strict=True)
-            angles = [f"{at:6.1f}° of {to:6.1f}°  {p[0]:.2f} {p[1]:.2f} bar" for at, to, p in joints]
+            angles = [f"{at:z6.1f}° of {to:z6.1f}°  {p[0]:.2f} {p[1]:.2f} bar" for at, to, p in joints]
             status.update(f"{reading.time:8.1f} s  {'   '.join(angles)}")
 
         yield see

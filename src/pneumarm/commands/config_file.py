@@ -74,7 +74,7 @@ def as_config(command: str, settings: Mapping[str, Any], app: App) -> str:
     """Return the options among ``settings``, by their names in Python, as a file for ``command`` with their words."""
     collection = app[command].assemble_argument_collection(parse_docstring=True)
     words = {one.name.removeprefix("--"): str(one.parameter.help or "") if one.parse else None for one in collection}
-    lines = ["# Options for pneumarm, to be read by --config; the command line goes before them."]
+    lines = ["# Options for pneumarm --config; the command line overrides them."]
     return "\n".join([*lines, *_table((command,), settings, words)]) + "\n"
 
 

@@ -5,6 +5,7 @@ from pneumarm.console import say, show, table
 from pneumarm.progress import progress
 from pneumarm.simulation.enough import TOO_LITTLE, enough_data
 from pneumarm.transitions import Store, Window, new_cells
+from pneumarm.transitions.filtering import NEW_CELLS
 
 
 def coverage_(db: AnyStore, /, *, json: Json = False) -> None:
@@ -35,11 +36,12 @@ def coverage_(db: AnyStore, /, *, json: Json = False) -> None:
     whole = found.whole
     rows = [
         ("transitions", f"{whole.seen:,}"),
-        ("of them kept by the filter", f"{whole.kept:,}"),
+        ("kept by the filter", f"{whole.kept:,}"),
         ("cells of the state space seen", f"{whole.occupied:,} of {whole.cells:,}"),
-        ("of them full", f"{whole.full:,}"),
-        ("new in the second half", f"{found.count:,}, {found.share:.0%} of those seen"),
+        ("full cells", f"{whole.full:,}"),
+        ("new in the second half", f"{found.count:,} cells, {found.share:.0%} of those seen"),
         ("chance that the next one is new", f"{whole.unseen:.0%}"),
     ]
     verdict = str(result["verdict"])
-    show(result, json, lambda: [verdict[0].upper() + verdict[1:], table(("", ""), rows)])
+    why = [NEW_CELLS] if result["enough"] else []
+    show(result, json, lambda: [verdict[0].upper() + verdict[1:], table(("", ""), rows), *why])

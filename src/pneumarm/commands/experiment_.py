@@ -31,7 +31,7 @@ def experiment_(
 ) -> None:
     """Repeat an experiment of the thesis, or do one of your own, and write its page.
 
-    Before an arm is recorded, or moved by an agent, it is said for how long, about. A second call computes only the
+    Before an arm is recorded or moved, the command says for about how long. A second call computes only the
     missing rows, also after a call that was killed or that asked for fewer runs.
 
     Parameters

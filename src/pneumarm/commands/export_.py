@@ -20,9 +20,8 @@ from pneumarm.transitions.export import FORMATS, export_recording
 from pneumarm.transitions.schema import is_store
 
 _OUT = (
-    f"What to write. Of a store: {', '.join(f'{end} ({one.words})' for end, one in FORMATS.items())}. Of an agent: "
-    ".onnx, its network and scaling, or .c, the same as C99 that needs no library, of one that settles, holds and "
-    "tracks."
+    f"What to write. From a store: {', '.join(f'{end} ({one.words})' for end, one in FORMATS.items())}. From an "
+    "agent: .onnx, its network and scaling, or .c, the same as plain C99, if it settles, holds and tracks."
 )
 
 

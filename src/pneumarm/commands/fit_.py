@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pneumarm.arm.seam import unit_of
 from pneumarm.commands.common import AnyStore, Json, Settings
-from pneumarm.console import say, show, table
+from pneumarm.console import percent, say, show, table
 from pneumarm.files import require_folder
 from pneumarm.progress import progress
 from pneumarm.simulation import FitSettings, fit_store
@@ -33,8 +33,8 @@ def fit_(
     for line in fitted.result.remarks:
         say(line)
     further, relative = fitted.simulation.window.further, result["relative_error"]
-    header = ("one-step error on held-out sequences", "std", "in", "relative")
-    rows = [(name, std, _unit(name, further), relative[name]) for name, std in result["std"].items()]
+    header = ("one-step error on held-out sequences", "std", "in", "of its change")
+    rows = [(name, std, _unit(name, further), percent(relative[name])) for name, std in result["std"].items()]
     show(result, json, lambda: [table(header, rows)])
 
 

@@ -1,13 +1,11 @@
 """``pneumarm live``."""
 
-import os
 import secrets
 import sys
-import webbrowser
 from contextlib import suppress
 from pathlib import Path
 
-from pneumarm.commands.common import Json, OwnMethod
+from pneumarm.commands.common import Json, OwnMethod, open_page
 from pneumarm.console import say, show, table
 from pneumarm.errors import UnusableInput
 from pneumarm.live.learning import TRANSFER, TRANSITIONS
@@ -41,7 +39,7 @@ def live_(
     ----------
     controllers
         The folder of a run, files of agents or of ``pneumarm tune``, or plan:SIM. With a folder in which nothing has
-        been learned yet, by default pneumarm-run, the page does the whole job when it is told to.
+        been learned yet, by default pneumarm-run, the page does the whole job at the press of a button.
     arm
         virtual, virtual:seed=N, serial:PORT, simulation:FILE or python:module:callable; by default that of the run,
         or else virtual.
@@ -53,11 +51,11 @@ def live_(
     token
         What the address of the page must hold; by default made up where others than this machine can reach it.
     browser
-        Open the page; by default where there is a screen.
+        Open the page; by default where there is a screen, a terminal and no variable CI.
     transitions
         Readings to record where the arm has still to learn.
     seed
-        Of a virtual arm's noise, and of what is learned.
+        Random seed of a virtual arm's noise and of what is learned.
     method
         The method that trained the agent, MODULE:NAME, if that is one of your own that is not installed.
     """
@@ -79,8 +77,7 @@ def live_(
 
     def opened() -> None:
         say(f"open {server.url}")
-        if browser or (browser is None and _has_screen()):
-            webbrowser.open(server.url)
+        open_page(server.url, browser, sys.stderr)
 
     with live_arm, suppress(KeyboardInterrupt):  # that is how it is meant to end
         server.run(opened)
@@ -121,9 +118,3 @@ def _is_new(name: str) -> bool:
 def _check_transferred(folder: Path) -> None:
     if not any(folder.glob("*.safetensors")):
         raise UnusableInput(f"{folder}: holds no run, and is not empty; give another folder")
-
-
-def _has_screen() -> bool:
-    """Whether a browser that is opened can be seen."""
-    graphical = sys.platform in ("win32", "darwin") or "DISPLAY" in os.environ or "WAYLAND_DISPLAY" in os.environ
-    return graphical and sys.stderr.isatty()

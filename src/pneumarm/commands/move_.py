@@ -25,18 +25,18 @@ def move_(
     settings: Annotated[MoveSettings, Settings] = MoveSettings(),
     json: Json = False,
 ) -> None:
-    """Move an arm to goals, one after the other, and hold each. A goal that is not settled at is tried again.
+    """Move an arm to goals, one after the other, and hold each. If it does not settle at one, it tries again.
 
-    Exit code 1 where one is still not settled at after its tries; the goals after it are moved to all the same. Exit
-    code 2 where a line of standard input is no goal: what was moved to before is told all the same. How stiff a joint
-    is to be at its goals is chosen when the agent is trained (``train --servo.stiffness``). The air used is known of
-    virtual arms, and of others that say it by ``Arm.air_used``; else it is left out, null with --json.
+    Exit code 1 if it did not settle at a goal in all its tries; it still moves to the goals after that. Exit code 2
+    if a line of standard input is no goal; movements made before are still reported. Stiffness at goals is chosen in
+    training (``train --servo.stiffness``). Virtual arms report air consumption, and so do others that
+    implement ``Arm.air_used``; otherwise it is left out, null with --json.
 
     Parameters
     ----------
     controller
-        The folder of a run, an agent, a controller from ``pneumarm tune``, plan:SIM, which plans in a simulation,
-        turn by turn, or inverse:DB, which goes back from the goals by what a store holds; both learn nothing.
+        The folder of a run, an agent, a controller from ``pneumarm tune``, plan:SIM, which plans in a simulation
+        at every control step, or inverse:DB, which goes back from the goals through a recording; neither learns.
     goals
         20deg (from the middle of the range) or 650 (counts); of several joints 20deg,-5deg; x and y of the hand from
         the first hinge 0.20m,-0.30m, where the arm's spec has its links; - for standard input, one a line, where
@@ -44,10 +44,10 @@ def move_(
     arm
         virtual, virtual:seed=N, serial:PORT, simulation:FILE or python:module:callable.
     seed
-        Of a virtual arm's noise.
+        Random seed of a virtual arm's noise.
     record
-        Store to add what is read and done to as it happens, for ``pneumarm view`` or to learn from; made if there is
-        none. However it ends, what was recorded is kept.
+        Store to record into, for ``pneumarm view`` or to learn from; created if it does not exist. What was recorded
+        is kept, however the command ends.
     method
         The method that trained the agent, MODULE:NAME, if that is one of your own that is not installed.
     """
@@ -65,7 +65,7 @@ def move_(
                 unusable = error
     # What is printed is printed even where one failed, or was none: it says which.
     result = {"movements": [one.results() for one in made]}
-    header = ("goal", "settled after [s]", "rest error [deg]", "tries", "valve changes", "air [l]")
+    header = ("goal", "settled after [s]", "rest error [deg]", "overshoot [deg]", "tries", "valve changes", "air [l]")
     show(result, json, lambda: [table(header, [_row(one) for one in made], arm)] if made else [])
     if unusable is not None:
         raise unusable
@@ -83,7 +83,7 @@ def _told(one: Moved) -> str:
 
 
 def _goal(one: Moved) -> str:
-    angles = ", ".join(f"{degrees:.1f}deg" for degrees in one.goal_degrees)
+    angles = ", ".join(f"{degrees:z.1f}deg" for degrees in one.goal_degrees)
     if one.goal_xy is None:
         return angles
     x, y = one.goal_xy
@@ -96,4 +96,5 @@ def _row(one: Moved) -> tuple[object, ...]:
     if one.hand_error is not None:
         rest += f" (hand: {1e3 * one.hand_error:.1f} mm)"
     air = None if one.air is None else f"{one.air:.2f}"
-    return _goal(one), settled, rest, one.tries, one.switches, air
+    over = ", ".join(f"{e:.1f}" for e in one.overshoot)
+    return _goal(one), settled, rest, over, one.tries, one.switches, air

@@ -1,20 +1,24 @@
 """``pneumarm run``."""
 
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import msgspec
+from cyclopts import Parameter
 from rich.table import Table
 
-from pneumarm.commands.common import COLUMNS, HEADINGS, Json, Monitoring, Settings, move_command
+from pneumarm.commands.common import Json, Monitoring, Settings, move_command, open_page
 from pneumarm.commands.config_file import as_config
+from pneumarm.commands.figures import figure_rows, reaching_table
 from pneumarm.commands.versions_ import say_history
 from pneumarm.console import say, show, table
 from pneumarm.control.condition import complaints
 from pneumarm.errors import UnusableInput
 from pneumarm.files import write_text
 from pneumarm.progress import compiling, progress, seconds_since_start
+from pneumarm.report.files import REPORT
 from pneumarm.run import Run, RunSettings
 from pneumarm.transitions import Store
 
@@ -29,6 +33,7 @@ def run_(
     monitor: Monitoring = "stop",
     settings: Annotated[RunSettings, Settings] = RunSettings(),
     write_config: Path | None = None,
+    no_browser: Annotated[bool, Parameter(negative="")] = False,
     json: Json = False,
 ) -> None:
     """Do the whole job: collect, fit, train, test, transfer, report.
@@ -45,10 +50,14 @@ def run_(
         The thesis' sizes, and its way of collecting (valves open for whole periods), are taken for what no other
         option says.
     write_config
-        Write all options into this TOML file, and do no more.
+        Write all options into this TOML file, and stop.
 
         They are those given, with what each means; the file must not exist. Change there what you like and call
         `pneumarm run --config FILE`.
+    no_browser
+        Do not open the report at the end.
+
+        It is opened where there is a screen and a terminal, and no environment variable CI.
     """
     if preset == "thesis":
         settings = settings.of_the_thesis()
@@ -64,10 +73,8 @@ def run_(
         "on arrival": results["transfer"]["before"],
         "after adaptation": results["transfer"]["after"],
     }
-    rows = [(name, *[figures[column] for column in COLUMNS]) for name, figures in phases.items()]
-    settles = run.settings.settles
-    title = "Reaching goals, for which it was not trained" if settles else "Ledger"
-    show(results, json, lambda: [*how_it_moves(results), table(("", *HEADINGS), rows, title=title)])
+    reaching = reaching_table(phases, trained_for=not run.settings.settles)
+    show(results, json, lambda: [*how_it_moves(results), reaching])
     say_history(out)
     for stage, doing in (("collect", "collecting"), ("transfer", "moving")):
         for line in complaints(results[stage], doing):
@@ -76,11 +83,14 @@ def run_(
     beside = results["rehearsal_memory_mb"]
     also = f", {beside:.0f} MB in the process that compiled beside it" if beside else ""
     say(
-        f"report: {out / 'report.html'}; {_took(sum(results['wall_seconds'].values()))}, "
+        f"done in {_took(sum(results['wall_seconds'].values()))}, "
         f"at most {results['peak_memory_mb']:.0f} MB of memory{also}"
     )
     with Store.open(run.store) as store:
         say(f"move the arm with {move_command(out, settings.arm, store.spec, store.percentiles())}")
+    page = (out / REPORT).resolve().as_uri()
+    say(f"report: {page}")
+    open_page(page, False if json or no_browser else None, sys.stdout)
 
 
 def how_it_moves(results: dict[str, Any]) -> Iterator[Table]:
@@ -88,23 +98,16 @@ def how_it_moves(results: dict[str, Any]) -> Iterator[Table]:
     found = results["settle"]
     if not found:
         return
-    seconds = found["median_seconds"]
-    rows = [
-        (
-            f"settles within {found['tolerance_deg']:g}° of",
-            f"{round(found['settled'] * found['movements'])} of {found['movements']} goals",
-        ),
-        ("half of them within", None if seconds is None else f"{seconds:.2f} s"),
-        ("rests off by", f"{found['rest_error_deg']:.2f}°"),
-        ("valve changes a second", f"{found['valve_changes_per_second']:.0f}"),
+    rows: list[tuple[str, str, str]] = [
+        *figure_rows(found),
+        ("valve changes a second", f"{found['valve_changes_per_second']:.0f}", ""),
     ]
-    if "overshoot_deg" in found:  # not in results of a version before this
-        rows.append(("half of them overshoot by less than", f"{found['overshoot_deg']:.1f}°"))
-        rows.append(("valve changes in the last second", f"{found['valve_changes_last_second']:.0f} a joint"))
+    if "valve_changes_last_second" in found:  # not in results of a version before this
+        rows.append(("valve changes in the last second", f"{found['valve_changes_last_second']:.0f} a joint", ""))
     for one in results["track"]:
         errors = ", ".join(f"{error:.2f}°" for error in one["rms_error_deg"])
-        rows.append((f"follows {one['amplitude_deg']:.0f}°, {one['frequency_hz']:g} Hz, off by", errors))
-    yield table(("adapted, on the arm", ""), rows, title="How it moves")
+        rows.append((f"follows {one['amplitude_deg']:.0f}°, {one['frequency_hz']:g} Hz, off by", errors, ""))
+    yield table(("adapted, on the arm", "", "normal"), rows, title="How it moves")
 
 
 def _spent(results: dict[str, Any]) -> Iterator[str]:

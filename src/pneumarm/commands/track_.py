@@ -27,8 +27,8 @@ def track_(
     Parameters
     ----------
     controller
-        The folder of a run, an agent, a controller from ``pneumarm tune``, plan:SIM, which plans in a simulation,
-        turn by turn, or inverse:DB, which goes back from the goals by what a store holds; both learn nothing.
+        The folder of a run, an agent, a controller from ``pneumarm tune``, plan:SIM, which plans in a simulation
+        at every control step, or inverse:DB, which goes back from the goals through a recording; neither learns.
     arm
         virtual, virtual:seed=N, serial:PORT, simulation:FILE or python:module:callable.
     reference
@@ -39,10 +39,10 @@ def track_(
     unforeseen
         The controller must not look at the reference's future, as if a person gave it by hand.
     seed
-        Of a virtual arm's noise.
+        Random seed of a virtual arm's noise.
     record
-        Store to add what is read and done to as it happens, for ``pneumarm view`` or to learn from; made if there is
-        none. However it ends, what was recorded is kept.
+        Store to record into, for ``pneumarm view`` or to learn from; created if it does not exist. What was recorded
+        is kept, however the command ends.
     method
         The method that trained the agent, MODULE:NAME, if that is one of your own that is not installed.
     """

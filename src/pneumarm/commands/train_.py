@@ -5,17 +5,14 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import Annotated, Any
 
-import numpy as np
-from rich.table import Table
-
-from pneumarm.arm import ArmSpec
-from pneumarm.commands.common import COLUMNS, HEADINGS, AnyStore, Json, Settings
+from pneumarm.commands.common import AnyStore, Json, Settings
+from pneumarm.commands.figures import reaching_table, settled_in, settling_told
 from pneumarm.console import show, table
 from pneumarm.errors import UnusableInput
 from pneumarm.files import require_folder
 from pneumarm.learning import LearnSettings, train
 from pneumarm.learning.tensorboard import Scalars
-from pneumarm.learning.training import Progress, Training
+from pneumarm.learning.training import Progress
 from pneumarm.progress import progress
 from pneumarm.simulation import Simulation
 from pneumarm.task import begin_states
@@ -45,7 +42,7 @@ def train_(
     out
         File of the agent to write; it contains all that it needs.
     seed
-        Of the initial weights, the exploration and the begin states.
+        Random seed of initial weights, exploration and begin states.
     agents
         Agents trained at once, of which the best is kept; by default as many as the method's settings say.
     tensorboard
@@ -74,7 +71,8 @@ def train_(
         if scalars is not None:
             scalars.write(training)
     training.agent.save(out)
-    result = training.results()
+    settle = settled_in(simulation, training.agent, seed)
+    result = training.results() | {"settle": settle}
     figures = [
         ("movements in simulation", f"{result['episodes']:,}"),
         ("steps", f"{result['steps']:,}"),
@@ -83,25 +81,9 @@ def train_(
         *([("met the criterion", f"{training.met.sum()} of {training.met.size}")] if training.met.size else []),
         ("kept", f"agent {training.best + 1}"),
     ]
-    show(result, json, lambda: [table(("trained", ""), figures), _validated(training, simulation.spec)])
-
-
-def _validated(training: Training[Any], spec: ArmSpec) -> Table:
-    """Return how the agents move; of those that settle, how well they do, because what they learn from is a price."""
-    if training.agent.settles:
-        rows = [
-            (
-                i + 1,
-                made.n,
-                f"{made.success.mean():.1%}",
-                f"{np.abs(made.goal - made.angle_end).mean() / spec.counts_per_degree:.2f}",
-            )
-            for i, made in enumerate(training.validation)
-        ]
-        return table(("agent, in simulation", "movements", "settled", "mean error at the end [deg]"), rows)
-    each = [one.results() for one in training.validation]
-    rows = [(i + 1, *(one[column] for column in COLUMNS)) for i, one in enumerate(each)]
-    return table(("agent, in simulation", *HEADINGS), rows)
+    each = {f"agent {i + 1}, in simulation": one.results() for i, one in enumerate(training.validation)}
+    moves = settling_told(settle) if settle else [reaching_table(each, trained_for=True)]
+    show(result, json, lambda: [table(("trained", ""), figures), *moves])
 
 
 def with_agents(settings: Any, agents: int) -> Any:

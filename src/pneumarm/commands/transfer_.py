@@ -4,9 +4,10 @@ from pathlib import Path
 from typing import Annotated
 
 from pneumarm.arm import open_arm
-from pneumarm.commands.common import COLUMNS, HEADINGS, Json, Monitoring, OwnMethod, Settings, move_command
+from pneumarm.commands.common import Json, Monitoring, OwnMethod, Settings, move_command
+from pneumarm.commands.figures import reaching_table
 from pneumarm.commands.versions_ import say_history
-from pneumarm.console import say, show, table
+from pneumarm.console import say, show
 from pneumarm.control import TransferSettings, open_agent, transfer_into
 from pneumarm.control.condition import complaints
 from pneumarm.control.versions import ADAPTED
@@ -37,7 +38,7 @@ def transfer_(
     arm
         virtual, virtual:seed=N, serial:PORT, simulation:FILE or python:module:callable.
     seed
-        Of the begin states, the goals and the exploration, and of a virtual arm's noise.
+        Random seed of begin states, goals and exploration, and of a virtual arm's noise.
     out
         Folder for episodes.csv, the store of all movements and the adapted agent; created if it does not exist.
     method
@@ -51,5 +52,5 @@ def transfer_(
         say(line)
     ready = move_command(out, arm, trained.spec, trained.goal_range)
     say(f"adapted agent: {out / ADAPTED}; move the arm by it with {ready}")
-    rows = [(phase, *(result[phase][column] for column in COLUMNS)) for phase in ("before", "after")]
-    show(result, json, lambda: [table(("reaching goals", *HEADINGS), rows)])
+    phases = {"on arrival": result["before"], "after adaptation": result["after"]}
+    show(result, json, lambda: [reaching_table(phases, trained_for=not trained.settles)])

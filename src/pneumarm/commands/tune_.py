@@ -36,7 +36,7 @@ def tune_(
     out
         File for the controller, JSON.
     seed
-        Of what is tried, and of a virtual arm's noise.
+        Random seed of what is tried and of a virtual arm's noise.
     """
     require_folder(out)
     with open_arm(arm, seed) as opened, progress("tuning") as report:

@@ -60,6 +60,6 @@ def _cells(row: dict[str, Any]) -> list[Any]:
     def mean(values: list[float] | None) -> str:
         return f"{math.exp(sum(map(math.log, values)) / len(values)):.2f}" if values else ""
 
-    state = "in use" if row["in_use"] else "taken back" if row["taken_back"] else ""
+    state = "in use" if row["in_use"] else "rolled back" if row["taken_back"] else ""
     fitted = "" if row["fitted_to"] is None else row["fitted_to"]
     return [row["version"], row["movement"], fitted, mean(row["error_before"]), mean(row["error_after"]), state]

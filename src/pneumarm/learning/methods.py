@@ -49,7 +49,7 @@ from pneumarm.learning.servo.settings import ServoSettings
 from pneumarm.learning.training import Progress, Training
 from pneumarm.learning.values import VALUES, ValueAgent
 from pneumarm.learning.values.agent import KIND as LEARNED_VALUES
-from pneumarm.settings import Settings, Valid
+from pneumarm.settings import Settings, Valid, in_words
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.task.acting import test_acting
 from pneumarm.task.begin import BeginStates
@@ -160,7 +160,7 @@ class LearnSettings(Settings):
     settle, hold and track name one and the same agent, which does all three (the default); reach one that reaches
     goals as in the thesis, where flying through one slowly enough counts."""
     method: str | None = None
-    """servo, policy, batched, hierarchy, esp, sarsa, q-learning, a rule of section 4.2, or MODULE:NAME of your own.
+    """servo, policy, batched, hierarchy, esp, sarsa, q-learning, a rule of section 4.2, or MODULE:NAME.
 
     batched: the thesis' networks learned in many arms at once; hierarchy: an upper agent sets subgoals of the thesis'
     agents; esp: an evolved recurrent network; sarsa and q-learning: the thesis'; td, monte-carlo, sarsa-lambda,
@@ -212,8 +212,10 @@ class LearnSettings(Settings):
             own = {name: _of_json(value) for name, value in self.own.items()}
             found = msgspec.convert({**own, **method.fixed}, method.settings, strict=False)
             return replace(found)  # msgspec leaves defaults in the class, where vars() does not see them
+        except msgspec.ValidationError as error:
+            raise UnusableInput(f"method {self.method}: expected {in_words(error)}") from error
         except msgspec.DecodeError as error:
-            raise UnusableInput(f"method {self.method}: {error}") from error
+            raise UnusableInput(f"method {self.method}: expected JSON after [ or {{; {error}") from error
 
 
 def _of_json(value: Any) -> Any:

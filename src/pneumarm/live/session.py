@@ -42,7 +42,7 @@ _MOST_ORDERS = 200  # that wait for the next turn; then the oldest is forgotten
 _FINDINGS = 6  # newest, that are told
 _TELL = 0.3  # s between two looks at how things stand
 _NAP = 0.05  # s between two looks of a loop that stands still
-_LOST = "holding: the page that controls the arm is not heard"
+_LOST = "holding: the controlling page lost its connection"
 
 
 class Mode(StrEnum):

@@ -4,7 +4,7 @@ from pneumarm.arm.guard import Interventions
 from pneumarm.arm.seam import ArmSpec
 from pneumarm.control.monitor.findings import Finding
 
-_NOTHING = "had nothing to prevent"
+_NOTHING = "no interventions"
 
 
 def sentence(found: Finding, spec: ArmSpec) -> str:

@@ -29,9 +29,9 @@ class MoveTrialSettings(Settings):
     tolerance: Annotated[float, Meta(gt=0, lt=360)] = TOLERANCE
     """A joint is there within so much [degrees]."""
     frequencies: tuple[Annotated[float, Meta(gt=0, le=100)], ...] = (0.25, 0.5, 1.0)
-    """Of the sinusoids that are followed [Hz]."""
+    """Frequencies of the sinusoids that are followed [Hz]."""
     amplitude: Annotated[float, Meta(gt=0, lt=360)] = 20.0
-    """Of the sinusoids about the middle of the goals; less where the arm does not go so far [degrees]."""
+    """Amplitude of the sinusoids about the middle of the goals; less where the arm does not go so far [degrees]."""
     seconds: Annotated[float, Meta(gt=0, le=3600)] = 8.0
     """For how long each sinusoid is followed [s]."""
 

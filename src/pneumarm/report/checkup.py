@@ -75,7 +75,7 @@ def _to_see_to(findings: Sequence[Complaint]) -> str:
 
 def _in_a_sentence(checkup: Checkup, j: int, muscles: Sequence[MuscleFigures]) -> str:
     """Say how far joint ``j`` turns, and how fast its muscles fill and leak where they do."""
-    low, high = (f"{angle:.0f}°".replace("-", "−") for angle in checkup.spec.degrees(ends(checkup.joints[j])))
+    low, high = (f"{angle:z.0f}°".replace("-", "−") for angle in checkup.spec.degrees(ends(checkup.joints[j])))
     slowest, leakiest = (max(getattr(one, what) for one in muscles) for what in ("fill_time", "leak"))
     does = [f"fill to two thirds within {slowest:.1f} s"] if np.isfinite(slowest) else []
     does += [f"leak up to {max(leakiest, 0.0):.1f} % a minute"] if np.isfinite(leakiest) else []
@@ -110,7 +110,7 @@ def _of_joint(checkup: Checkup, j: int) -> Section:
                 noise_figure(checkup, j),
                 "Noise at rest, detrended: power spectrum and autocorrelation (thesis A.1.3). White noise has a flat "
                 "spectrum and no correlation; the grey band holds 99 % of what white noise shows; beyond the dotted "
-                "lines it is said not to be white.",
+                "lines it does not count as white.",
                 f"noise of {figures.angle_noise:.2f} counts in the angle",
             ),
             Picture(

@@ -11,6 +11,7 @@ from pneumarm.report.figures.marked import marked_rows
 from pneumarm.report.ledger import MISSING
 from pneumarm.report.page import Picture, Section, Table
 
+HEALTH = "What was found wrong"
 _PHASES = {COLLECTING: COLLECTING, "before": "on arrival", "learning": "while learning", "after": "after adaptation"}
 _STAGES = {"collect": COLLECTING, "transfer": "moving"}
 
@@ -18,12 +19,6 @@ _STAGES = {"collect": COLLECTING, "transfer": "moving"}
 def tells_of_health(results: Mapping[str, Any]) -> bool:
     """Return whether ``results`` say whether something was wrong."""
     return any("findings" in results.get(stage, {}) for stage in _STAGES)
-
-
-def summary_of_health(results: Mapping[str, Any]) -> list[str]:
-    """Return what the summary of a report says of what was wrong: nothing where nothing was."""
-    found = len(_findings(results))
-    return [f"The monitor found {found} thing{'s' if found > 1 else ''} wrong with the arm."] if found else []
 
 
 def health(results: Mapping[str, Any], marked: MarkedData | None, spec: ArmSpec) -> Section:
@@ -36,7 +31,7 @@ def health(results: Mapping[str, Any], marked: MarkedData | None, spec: ArmSpec)
 
     """
     counts = _counts(results)
-    found = _findings(results)
+    found = findings(results)
     tables = [table for table in (_found_table(found), _counts_table(counts), _link_table(counts)) if table]
     spoiled = marked is not None and len(marked.spans) > 0
     text = [
@@ -52,7 +47,7 @@ def health(results: Mapping[str, Any], marked: MarkedData | None, spec: ArmSpec)
             "broken are marked: they are kept, and nothing is learned from them. A leak or a change of the arm is "
             "reported and not marked, because what such an arm does is what there is to learn."
         )
-    return Section("What was found wrong", text, [_picture(marked, spec)] if marked and spoiled else [], tables)
+    return Section(HEALTH, text, [_picture(marked, spec)] if marked and spoiled else [], tables)
 
 
 def _counts(results: Mapping[str, Any]) -> dict[str, Counts]:
@@ -60,7 +55,8 @@ def _counts(results: Mapping[str, Any]) -> dict[str, Counts]:
     return {phase: Counts.of(counts) for phase, counts in saved.items()}
 
 
-def _findings(results: Mapping[str, Any]) -> list[Sequence[str]]:
+def findings(results: Mapping[str, Any]) -> list[Sequence[str]]:
+    """Return what was found wrong, where, while what, since and until when, and the rows marked."""
     return [
         row
         for stage, doing in _STAGES.items()

@@ -131,9 +131,9 @@ def bound_table(bound: Mapping[str, Any]) -> Table:
         rows,
         "The bound: the best valve sequences of at most three switches that planning with the virtual arm's true "
         "physics finds for the first movements of the tests on the arm; in open loop planned once, on an arm without "
-        "noise, in closed loop every turn anew on the arm with its sensors. The controller is compared movement by "
-        f"movement with what is planned in just these; 95% confidence intervals in brackets.{unproven} The thesis "
-        "could not know it (section 5.5.1).",
+        "noise, in closed loop again at every control step, on the arm with its sensors. The controller is compared "
+        f"movement by movement with what is planned in just these; 95% confidence intervals in brackets."
+        f"{unproven} The thesis could not know it (section 5.5.1).",
     )
 
 
@@ -147,8 +147,8 @@ def with_interval(estimate: Estimate, form: str) -> str:
 
 
 def written(value: float, form: str) -> str:
-    """Return ``value`` for people: with a minus, which is longer than a hyphen."""
-    return form.format(value).replace("-", "−")
+    """Return ``value`` for people: with a minus, which is longer than a hyphen, but for zero."""
+    return form.replace("{:", "{:z").format(value).replace("-", "−")
 
 
 def duration(seconds: float) -> str:

@@ -9,6 +9,7 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from matplotlib.figure import Figure
 
+from pneumarm.moving.told import ToldFigure
 from pneumarm.report.style import Described, svg
 
 
@@ -57,20 +58,49 @@ class Section:
     tables: Sequence[Table] = field(default=())
     opens: bool = False
     """Whether the page opens with it, before its contents."""
+    folded: bool = False
+    """Whether only its title is seen until somebody opens it. A page that folds needs no contents."""
 
     @property
     def anchor(self) -> str:
         """The section's id on the page."""
-        return "section-" + re.sub(r"[^a-z0-9]+", "-", self.title.lower()).strip("-")
+        return anchor_of(self.title)
 
 
-def render(title: str, summary: Sequence[str], sections: Sequence[Section]) -> str:
+def anchor_of(title: str) -> str:
+    """Return the id of the section called ``title``."""
+    return "section-" + re.sub(r"[^a-z0-9]+", "-", title.lower()).strip("-")
+
+
+@dataclass(frozen=True)
+class Light:
+    """A question about a run, answered."""
+
+    question: str
+    good: bool | None
+    """None where it is not known."""
+    answer: str
+    """In a word."""
+    words: str
+    title: str
+    """Of the section that says more."""
+
+
+def render(
+    title: str,
+    summary: Sequence[str],
+    sections: Sequence[Section],
+    headline: Sequence[ToldFigure] = (),
+    lights: Sequence[Light] = (),
+) -> str:
     """Return the page as HTML text; the same sections give the same text.
 
     Args:
         title: of the page.
         summary: paragraphs under the title.
         sections: in order; their titles must differ.
+        headline: the figures that the page opens with, large.
+        lights: questions and answers, after what it opens with.
 
     """
     anchors = [section.anchor for section in sections]
@@ -85,7 +115,15 @@ def render(title: str, summary: Sequence[str], sections: Sequence[Section]) -> s
     )
     environment.filters["embedded"] = embedded
     template = environment.get_template("page.html")
-    return template.render(title=title, summary=summary, sections=list(_numbered(sections)))
+    known = [(one, anchor_of(one.title) if anchor_of(one.title) in anchors else "") for one in lights]
+    return template.render(
+        title=title,
+        summary=summary,
+        sections=list(_numbered(sections)),
+        headline=headline,
+        lights=known,
+        folds=any(section.folded for section in sections),
+    )
 
 
 def _numbered(sections: Sequence[Section]) -> Iterator[dict[str, Any]]:

@@ -17,7 +17,7 @@ def playing(shown: Shown, caption: str, *, dashed: str = "asked for") -> Picture
     """
     wide, narrow = (moving_arm(shown, dashed=dashed, narrow=narrow) for narrow in (False, True))
     degrees = shown.spec.degrees(shown.angle)
-    low, high = (f"{end:.0f}".replace("-", "−") for end in (degrees.min(), degrees.max()))
+    low, high = (f"{end:z.0f}".replace("-", "−") for end in (degrees.min(), degrees.max()))
     words = f"{shown.time[-1] - shown.time[0]:.0f} seconds of movement between {low} and {high} degrees"
     if shown.wanted is not None:
         near = (np.abs(degrees - shown.spec.degrees(shown.wanted)) <= 1).all(axis=1).mean()

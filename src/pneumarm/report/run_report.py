@@ -27,14 +27,12 @@ from pneumarm.report.files import (
     read_results,
     read_spec,
 )
-from pneumarm.report.health import summary_of_health
+from pneumarm.report.front import headline, lights
 from pneumarm.report.page import Section, render
 from pneumarm.report.sections import (
     RunData,
     all_sections,
-    arrival_words,
     coverage_section,
-    moving_words,
     one_step,
     predicted_words,
     propagated,
@@ -81,7 +79,8 @@ def write_analysis(
 
 def run_page(run: RunData, drawn: Mapping[str, Sequence[Section]] | None = None) -> str:
     """Return the HTML page of ``run``; ``drawn`` as of :func:`write_report`."""
-    return render(f"An arm learns to move: {run.spec.name}", _summary(run), all_sections(run, drawn))
+    title = f"An arm learns to move: {run.spec.name}"
+    return render(title, _summary(run), all_sections(run, drawn), headline(run), lights(run))
 
 
 def read_run(folder: Path) -> RunData:
@@ -123,13 +122,19 @@ def _read_transfer(path: Path, results: dict[str, Any]) -> TransferData | None:
 
 
 def _summary(run: RunData) -> list[str]:
-    spec = run.spec
-    joints = f"{spec.joints} joint{'s' if spec.joints > 1 else ''}"
-    text = [f"{spec.name}: {joints}, {1 / spec.period:.3g} Hz, pressures up to {spec.max_pressure:.3g} bar."]
+    """Return what the large figures are of."""
+    spec, found = run.spec, run.results.get("settle") or {}
+    words = f"{spec.joints} joint{'s' if spec.joints > 1 else ''}, {1 / spec.period:.3g} Hz, "
+    words += f"pressures up to {spec.max_pressure:.3g} bar"
+    if found:
+        words += f"; {found['valve_changes_per_second']:.1f} valve changes a second while it moves and holds"
+    if (air := found.get("air_litres_per_movement")) is not None:
+        words += f", and {air:.2f} normal litres of air a movement"
+    text = [f"{words}."]
     if not spec.pressure_sensors:
         text.append(
             "Its pressures are not measured: wherever they are shown, they are estimated from what the valves were "
             "told. The guard could not limit them, and the monitor judged angles alone: neither valves, nor the "
             "supply, nor leaks."
         )
-    return [*(moving_words(run.results) or arrival_words(run)), *text, *summary_of_health(run.results)]
+    return text

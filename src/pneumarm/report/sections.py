@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -24,14 +24,12 @@ from pneumarm.report.data import (
 )
 from pneumarm.report.figures.adaptation import CurveMark, adaptation_curves
 from pneumarm.report.figures.coverage import cells, new_share, projections
-from pneumarm.report.figures.displacement import against_displacement
-from pneumarm.report.figures.episodes import distributions
 from pneumarm.report.figures.film import movement
 from pneumarm.report.figures.importance import input_importance
 from pneumarm.report.figures.isoplots import isoplot
 from pneumarm.report.figures.propagation import error_propagation
 from pneumarm.report.figures.residues import IN_A_ROW, Classification, residue_by_class, residues
-from pneumarm.report.figures.training import PRICE, spread_of_agents, training_curves
+from pneumarm.report.figures.training import PRICE, training_curves
 from pneumarm.report.figures.transfer import Phase, transfer_curves
 from pneumarm.report.health import health, tells_of_health
 from pneumarm.report.ledger import beside_thesis, bound_table, ledger, written
@@ -40,6 +38,10 @@ from pneumarm.report.playing import playing
 from pneumarm.report.style import of_joint, quantities
 from pneumarm.report.thesis import GOAL_TOLERANCE
 from pneumarm.task import Movements, running_time
+from pneumarm.transitions.filtering import NEW_CELLS
+
+COVERAGE, ONE_STEP = "Coverage of the collected data", "How well the simulation predicts one step"
+"""Titles of sections that others lead to."""
 
 
 @dataclass(frozen=True)
@@ -72,39 +74,48 @@ def learning_sections(run: RunData) -> list[Section]:
         ]
     if run.training is not None:
         sections.append(trained(run.training, run.spec))
-    if run.test is not None:
-        sections.append(tested(run.test))
     return sections
 
 
 def moved(run: RunData) -> list[Section]:
-    """Return the sections of ``run`` on how an agent moved the arm and learned from it."""
-    sections = []
-    if run.transfer is not None:
+    """Return the sections of ``run`` on how an agent learned from moving the arm."""
+    return [] if run.adaptation is None else [adapted(run.adaptation, run.spec)]
+
+
+def reached(run: RunData) -> list[Section]:
+    """Return the figures of the thesis' task; averages only where there are enough movements."""
+    sections = [demonstrated(run.demonstrations, run.spec)] if run.demonstrations else []
+    if run.transfer is not None and max(phase.n for phase in run.transfer.phases.values()) >= _FEWEST_AVERAGED:
         sections.append(transferred(run.transfer, run.test))
-        if run.adaptation is not None:
-            sections.append(adapted(run.adaptation, run.spec))
-        sections.append(by_displacement(run.transfer, run.test, run.spec))
-    if run.demonstrations:
-        sections.append(demonstrated(run.demonstrations, run.spec))
     return sections
 
 
-PARTS: Mapping[str, Callable[[RunData], list[Section]]] = {"learned": learning_sections, "moved": moved}
+PARTS: Mapping[str, Callable[[RunData], list[Section]]] = {
+    "learned": learning_sections,
+    "moved": moved,
+    "reached": reached,
+}
 """What can be drawn before a run ends, each by its name, in the order in which it can."""
+_FEWEST_AVERAGED = 100  # movements; the bands of fewer cover everything
 
 
 def all_sections(run: RunData, drawn: Mapping[str, Sequence[Section]] | None = None) -> list[Section]:
-    """Return the sections of ``run`` in the order of the way of the data; ``drawn`` are parts that are there."""
-    drawn = drawn or {}
-    shown = run.moving or one_after_the_other(run.demonstrations)
-    sections = [] if shown is None else [moving(shown, run.results, run.spec)]
-    sections.append(overview(run))
-    for name, part in PARTS.items():
-        sections += drawn[name] if name in drawn else part(run)
-    if tells_of_health(run.results):
-        sections.append(health(run.results, run.marked, run.spec))
-    return sections
+    """Return the sections of ``run``: the arm, folded how it came to that, and at the end the thesis' task.
+
+    ``drawn`` are parts that are there.
+    """
+    parts = {name: (drawn or {}).get(name) or part(run) for name, part in PARTS.items()}
+    shown, results = run.moving or one_after_the_other(run.demonstrations), run.results
+    detailed = [*followed(results, run.spec), *parts["learned"], *parts["moved"]]
+    if tells_of_health(results):
+        detailed.insert(0, health(results, run.marked, run.spec))
+    task = [overview(run), *parts["reached"]]
+    return [
+        *([] if shown is None else [moving(shown, run.spec)]),
+        *(replace(section, folded=True) for section in detailed),
+        Section("The thesis' task", [task_words(results)]),
+        *(replace(section, folded=True) for section in task),
+    ]
 
 
 def one_after_the_other(shown: Sequence[Demonstration]) -> MovingData | None:
@@ -123,52 +134,21 @@ def one_after_the_other(shown: Sequence[Demonstration]) -> MovingData | None:
     )
 
 
-def moving(data: MovingData, results: Mapping[str, Any], spec: ArmSpec) -> Section:
-    """Return how the arm moves, as a picture that plays, and in degrees and seconds."""
+def moving(data: MovingData, spec: ArmSpec) -> Section:
+    """Return how the arm moves, as a picture that plays."""
     caption = "The arm as it moved to its goals, which are orange. The more pressure in a muscle, the thicker it is."
-    picture = playing(data.shown(spec), caption)
+    return Section("How it moves", (), [playing(data.shown(spec), caption)], opens=True)
+
+
+def followed(results: Mapping[str, Any], spec: ArmSpec) -> list[Section]:
+    """Return the sinusoids that were followed; no section where there were none."""
     tracked = [
-        (
-            f"{one['frequency_hz']:g} Hz, {one['amplitude_deg']:.0f}°",
-            *(f"{e:.2f}" for e in one["rms_error_deg"]),
-        )
+        (f"{one['frequency_hz']:g} Hz, {one['amplitude_deg']:.0f}°", *(f"{e:.2f}" for e in one["rms_error_deg"]))
         for one in results.get("track", [])
     ]
     errors = (f"RMS error{of_joint(joint, spec.joints)} [°]" for joint in range(spec.joints))
     table = Table(("sinusoid", *errors), tracked, "Sinusoids that were followed, the reference known ahead.")
-    return Section("How it moves", (), [picture], [table] if tracked else [], opens=True)
-
-
-def moving_words(results: Mapping[str, Any]) -> list[str]:
-    """Return what a run says of settling and holding, as sentences; none where it was not tried."""
-    found = results.get("settle")
-    if not found:
-        return []
-    seconds = found["median_seconds"]
-    words = (
-        f"The arm settles within {found['tolerance_deg']:g}° of {found['settled']:.1%} of {found['movements']} goals"
-        + (f", half of them within {seconds:.2f} s" if seconds is not None else "")
-        + f", and rests {found['rest_error_deg']:.2f}° off on average, with "
-        f"{found['valve_changes_per_second']:.1f} valve changes a second while it moves and holds"
-    )
-    air = found["air_litres_per_movement"]
-    return [words + (f" and {air:.2f} normal litres of air a movement." if air is not None else ".")]
-
-
-def arrival_words(run: RunData) -> list[str]:
-    """Return how often, how soon and how exactly goals are reached, as sentences; on the arm where it was tried."""
-    transfer = run.transfer
-    phases = [] if transfer is None else [("on the arm", transfer.after), ("on the arm, on arrival", transfer.before)]
-    for where, made in (*phases, ("in the simulation", run.test)):
-        if made is None or not made.n:
-            continue
-        words, won = f"It reaches {made.success.mean():.1%} of {made.n:,} goals {where}", made.success
-        if not won.any():
-            return [f"{words}."]
-        seconds = float(np.median(made.actions[won])) * run.spec.period
-        off = np.abs(made.angle_end - made.goal)[won].max(axis=1).mean() / run.spec.counts_per_degree
-        return [f"{words}, half of them within {seconds:.2f} s, and is {off:.2f}° off on average when it does."]
-    return []
+    return [Section("How it follows a reference", tables=[table])] if tracked else []
 
 
 def reached_words(run: RunData) -> list[str]:
@@ -200,25 +180,22 @@ def reached_words(run: RunData) -> list[str]:
     return text
 
 
+def task_words(results: Mapping[str, Any]) -> str:
+    """Say what the thesis' task is."""
+    words = "In the thesis a goal is reached once it is touched slowly enough, and changing valves costs reward."
+    if results.get("settle"):
+        words += " This agent was not trained for that: it stays at goals, and does not save changes."
+    return words
+
+
 def overview(run: RunData) -> Section:
     """Return the ledger and the comparison with the thesis."""
-    bound, reached = run.results.get("bound", {}), reached_words(run)
-    text = [" ".join(reached)] if reached else []
-    if moving_words(run.results):
-        text.insert(
-            0,
-            "What follows is the thesis' measure: a goal is reached once it is touched slowly enough, and each "
-            "change of valves costs 8 of the reward. This agent stays at goals instead, and does not save changes.",
-        )
-    text += [
-        "The first table is what counts: how well the controller moves in the simulation it was trained in, on the "
-        "arm as it arrives there, and after it went on learning on the arm. The last table puts our figures beside "
-        "those of the thesis."
-    ]
-    if "missing" in bound:
+    bound, words = run.results.get("bound", {}), reached_words(run)
+    text = [" ".join(words)] if words else []
+    if "missing" in bound and not run.results.get("settle"):
         text.append(f"What can be achieved on this arm at all is unknown: {bound['missing']}.")
     return Section(
-        "Results",
+        "Reward, and the thesis' figures beside ours",
         text,
         tables=(
             ledger(run.test, run.transfer, run.results.get("test", {}).get("lookahead")),
@@ -247,12 +224,9 @@ def coverage_section(data: CoverageData, spec: ArmSpec) -> Section:
     ]
     if len(data.growth) > 1:
         share = new_share(data.growth)
-        text.append(
-            f"The second half of the data added {share:.1%} of the occupied cells. Whether it made the "
-            "simulation any better is another question, which pneumarm coverage answers."
-        )
+        text.append(f"The second half of the data added {share:.1%} of the occupied cells. {NEW_CELLS}")
     return Section(
-        "Coverage of the collected data",
+        COVERAGE,
         text,
         (
             Picture(
@@ -351,7 +325,7 @@ def simulation_section(data: QualityData, spec: ArmSpec) -> Section:
         )
     )
     return Section(
-        "How well the simulation predicts one step",
+        ONE_STEP,
         (
             f"The simulation's prediction one step ahead, on {len(error):,} transitions of sequences that it was not "
             "fitted to (thesis section 3.3).",
@@ -410,18 +384,21 @@ def _invalid(found: Mapping[str, Any], spec: ArmSpec) -> list[str]:
 
 def trained(data: TrainingData, spec: ArmSpec) -> Section:
     """Return the training curves and the spread of the agents."""
+    priced, agents, best = PRICE in data.columns, len(data.reward), data.chosen
+    sign, paid, won = (-1, "price", "within tolerance at the end") if priced else (1, "reward", "success")
+    low, high = sorted(sign * end for end in (data.reward.min(), data.reward.max()))
     text = [
-        f"{len(data.reward)} agents learn at once from different initial weights, because these decide most (thesis "
-        "section 5.4.2); the best in a validation of its own is kept."
+        f"{agents} agents learn at once from different initial weights, because these decide most (thesis section "
+        f"5.4.2); the best in a validation is kept. There it has {paid} {sign * data.reward[best]:.2f} a movement "
+        f"(all agents {low:.2f} to {high:.2f}) and {data.success[best]:.1%} {won} ({data.success.min():.1%} to "
+        f"{data.success.max():.1%})."
     ]
     if "deviation" in data.columns:
         text.append(
             "Shaping lets begin states lie farther from the goal as the agent meets its criterion (thesis section "
             "4.3.2)."
         )
-    priced = PRICE in data.columns
     learned = "How the agents learned; exploring they earn less than tested (over deviations: thesis figure 4.3)."
-    validated = "Validation of all agents, ordered by reward (the spread over runs: thesis tables 5.5 and 5.7)."
     if priced:
         text.append(
             "A movement has a price here, for errors, changes of valves and slack muscles, in place of the thesis' "
@@ -430,35 +407,11 @@ def trained(data: TrainingData, spec: ArmSpec) -> Section:
             "within tolerance than goals are settled at on the arm."
         )
         learned = "How the agents learned (prices: no figure in the thesis)."
-        validated = "Validation of all agents, cheapest first (the spread over runs: thesis tables 5.5 and 5.7)."
     pictures = []
     if len(data.columns) > 1:
-        pictures.append(
-            Picture(
-                training_curves(data.curves, data.columns, data.evaluated, data.chosen, spec),
-                learned,
-            )
-        )
-    pictures.append(Picture(spread_of_agents(data.reward, data.success, data.chosen, priced=priced), validated))
+        curves = training_curves(data.curves, data.columns, data.evaluated, data.chosen, spec)
+        pictures.append(Picture(curves, learned))
     return Section("Training in the simulation", text, pictures)
-
-
-def tested(test: Movements) -> Section:
-    """Return the distribution of the test's episodes."""
-    return Section(
-        "Test in the simulation",
-        (
-            f"{test.n:,} greedy movements from all begin states to all goals in the noisy "
-            "simulation (thesis section 5.2).",
-        ),
-        (
-            Picture(
-                distributions(test.reward, test.actions, test.all_switches, test.success),
-                "Reward, actions and switches of the test's episodes; the dashed line is the median. Values beyond "
-                "the drawn range are counted in the outermost bar (thesis section 5.2; no figure there).",
-            ),
-        ),
-    )
 
 
 def transferred(data: TransferData, test: Movements | None) -> Section:
@@ -494,7 +447,7 @@ def adapted(data: Adapted, spec: ArmSpec) -> Section:
     text = [
         "After every movement the simulation's errors on the arm are compared with those of its fit. Where a "
         "simulation that is fitted to the newest movements predicts others of them better, the agent becomes a new "
-        "version; one that earns less than that before it is taken back."
+        "version; one that earns less than the one before is rolled back."
     ]
     text += [f"{sentence[0].upper()}{sentence[1:]}." for sentence in happened]
     if not happened:
@@ -532,32 +485,6 @@ def levels(test: Movements) -> dict[str, float]:
     if won.any():
         found |= {"actions": float(test.actions[won].mean()), "switches": float(test.all_switches[won].mean())}
     return found
-
-
-def by_displacement(data: TransferData, test: Movements | None, spec: ArmSpec) -> Section:
-    """Return actions and switches against displacement, on the arm and in the simulation."""
-    pictures = []
-    arrived = data.after if data.after.n else data.before
-    for name, episodes in (("on the arm after adaptation", arrived), ("in the simulation's test", test)):
-        if episodes is None:
-            continue
-        where = "on the arm on arrival" if episodes is data.before else name
-        won = episodes.success
-        pictures.append(
-            Picture(
-                against_displacement(episodes.distance[won], episodes.actions[won], episodes.all_switches[won], spec),
-                f"Actions and switches of successful episodes {where} against their angular displacement (thesis "
-                "figures 5.15 and 5.16). Points are shifted up and down a little to show how many there are.",
-            )
-        )
-    return Section(
-        "Actions and switches by displacement",
-        (
-            "Longer movements take more actions; short ones are often less smooth for their length (thesis section "
-            "5.5.2).",
-        ),
-        pictures,
-    )
 
 
 def demonstrated(demonstrations: tuple[Demonstration, ...], spec: ArmSpec) -> Section:

@@ -119,7 +119,7 @@ class FitSettings(Settings):
     """Share of the sequences that is kept out of the fit, to measure its errors on; at least one sequence in which
     the arm moves. Where too few do, stretches within sequences are held out."""
     seed: NonNegativeInt = 0
-    """Of the initial weights and of every other choice by lot."""
+    """Random seed of initial weights and of every other random choice."""
     grid: GridSettings = field(default_factory=GridSettings)
     """The grid by which the recording is filtered."""
 

@@ -13,12 +13,13 @@ find nothing but the oldest observation in them.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import KDTree
 
 from pneumarm.arm.seam import ArmSpec
+from pneumarm.extras import extra
 from pneumarm.simulation.fit import FitSettings, fit
 from pneumarm.simulation.simulation import Simulation
 from pneumarm.transitions.choice import choose_held_out
@@ -37,7 +38,7 @@ class InverseSimulation:
 
     backward: Simulation
     """Predicts what was before."""
-    recorded: Mapping[tuple[float, ...], KDTree]
+    recorded: Mapping[tuple[float, ...], Any]
     """Scaled observations that followed each command."""
     reach: float
     """Distance up to which a scaled observation is about as one that was recorded."""
@@ -62,6 +63,16 @@ class InverseSimulation:
         return _scaled(self.backward, observations)
 
 
+def nearest(points: NDArray[np.float64]) -> Any:
+    """Return a k-d tree of ``points`` (n, size), which finds the nearest of them.
+
+    Raises:
+        UnusableInput: SciPy is not installed.
+
+    """
+    return extra("scipy.spatial", "inverse", "the inverse simulation").KDTree(points)
+
+
 def turned_round(transitions: Transitions) -> Transitions:
     """Return ``transitions`` of single observations with what was before as their target (thesis eq. 4.17)."""
     commands = transitions.inputs[:, transitions.target.shape[1] :]
@@ -81,7 +92,7 @@ def fit_inverse(
     settings = FitSettings(**{**vars(SETTINGS), "seed": seed})
     one, other = turned_round(training), turned_round(held_out)
     backward = fit(one, other, spec=spec, goal_range=goal_range, settings=settings).simulation
-    recorded = {tuple(command.tolist()): KDTree(after) for command, after in _by_command(backward, training)}
+    recorded = {tuple(command.tolist()): nearest(after) for command, after in _by_command(backward, training)}
     distances = [
         recorded[tuple(command.tolist())].query(after)[0]
         for command, after in _by_command(backward, held_out)

@@ -152,6 +152,13 @@ class NewCells:
         return self.count / self.whole.occupied
 
 
+NEW_CELLS = (
+    "New cells do not mean that more data would help: networks that have seen some states know their neighbours. "
+    "What counts is whether the simulation's error still falls."
+)
+"""What to tell a person who sees many new cells beside data that are enough."""
+
+
 def new_cells(source: Iterable[Rows], window: Window, settings: GridSettings | None = None) -> NewCells:
     """Compare how the first half of the transitions and all of them cover the same grid.
 

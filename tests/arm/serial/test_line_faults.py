@@ -431,7 +431,7 @@ def test_a_board_of_another_version_is_refused(monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_shares_are_shares() -> None:
-    with pytest.raises(UnusableInput, match=r"dropped cannot be 1\.5; expected `float` <= 1"):
+    with pytest.raises(UnusableInput, match=r"dropped cannot be 1\.5; expected a number, 1 or less"):
         LineFaults(dropped=1.5)
 
 

@@ -279,7 +279,7 @@ def test_chains_have_names():
         ("virtual:joints=two", "expected virtual"),
         ("virtual:joints=2,preset=A", "do not go together"),
         ("virtual:coupling=0.5", "one joint is coupled to none"),
-        ("virtual:joints=2,coupling=2", "expected `float` <= 1"),
+        ("virtual:joints=2,coupling=2", "expected a number, 1 or less"),
         ("virtual:joints=2,coupling=x", "coupling of 0 to 1"),
     ):
         with pytest.raises(UnusableInput, match=why):

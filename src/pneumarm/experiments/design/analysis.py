@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from pneumarm.errors import UnusableInput
 from pneumarm.experiments.design.anova import Source, anova, smallest
 from pneumarm.experiments.design.assignment import Design, Level
-from pneumarm.experiments.design.best import Best, Confirmation, Criterion, confirm, derive
+from pneumarm.experiments.design.best import Aim, Best, Confirmation, confirm, derive
 from pneumarm.experiments.design.distributions import t_quantile
 from pneumarm.experiments.design.effects import Effects, effects
 from pneumarm.experiments.design.half_normal import Lenth, lenth
@@ -149,9 +149,9 @@ def analyse_table(design: Design, results: ArrayLike, goal: Goal = "larger") -> 
         except UnusableInput:
             continue  # not defined for these results
     found = {name: effects(array, values) for name, values in losses.items()}
-    criteria = [Criterion("mean", found["mean"], goal == "larger")]
+    criteria = [Aim("mean", found["mean"], goal == "larger")]
     if "std" in found:
-        criteria.append(Criterion("std", found["std"], larger=False))
+        criteria.append(Aim("std", found["std"], larger=False))
     testable = array.columns >= 3 and bool((array.counts == 2).all())
     pooled = smallest(found["mean"].sizes, -(-array.columns // 2)) if y.shape[1] == 1 else ()
     return TableAnalysis(

@@ -26,7 +26,7 @@ from pneumarm.experiments.design.effects import Effects
 
 
 @dataclass(frozen=True)
-class Criterion:
+class Aim:
     """A loss and which way it is good."""
 
     name: str
@@ -62,13 +62,13 @@ class Best:
     """Trial of the array that has these settings, if one has."""
 
 
-def derive(design: Design, criteria: Sequence[Criterion]) -> Best:
+def derive(design: Design, criteria: Sequence[Aim]) -> Best:
     """Return the best settings of ``design`` by its ranked effects, see the module."""
     levels: dict[str, int] = {}
     steps: list[FixedFactor] = []
-    waiting: list[tuple[int, Criterion, int]] = []
+    waiting: list[tuple[int, Aim, int]] = []
 
-    def fix(factor: str, level: int, column: int, criterion: Criterion, rank: int) -> None:
+    def fix(factor: str, level: int, column: int, criterion: Aim, rank: int) -> None:
         levels[factor] = level
         steps.append(FixedFactor(factor, level, column, criterion.name, rank))
         for item in list(waiting):
@@ -76,7 +76,7 @@ def derive(design: Design, criteria: Sequence[Criterion]) -> Best:
                 waiting.remove(item)
                 consider(*item)
 
-    def consider(column: int, criterion: Criterion, rank: int) -> None:
+    def consider(column: int, criterion: Aim, rank: int) -> None:
         factor = design.on(column)
         if factor is not None:
             if factor.label not in levels:

@@ -12,15 +12,14 @@ Differences from the thesis:
 """
 
 from dataclasses import dataclass
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import KDTree
 
 from pneumarm.arm.valves import ACTIONS, CLOSED, VALVES
 from pneumarm.settings import NonNegativeFloat, PositiveFloat, PositiveInt, PythonOnly
-from pneumarm.simulation.inverse import InverseSimulation
+from pneumarm.simulation.inverse import InverseSimulation, nearest
 from pneumarm.task.settings import TaskSettings
 
 
@@ -48,8 +47,8 @@ class InverseSettings(TaskSettings):
 class Cloud(NamedTuple):
     """States on the way to a goal."""
 
-    states: KDTree
-    """Scaled, shape (n, observation_size)."""
+    states: Any
+    """k-d tree of scaled observations, shape (n, observation_size)."""
     actions: NDArray[np.int64]
     """What to do there, shape (n,)."""
     steps: NDArray[np.int64]
@@ -78,7 +77,7 @@ def cloud_of(
         states.append(inverse.scaled(frontier))
         actions.append(led[kept])
         steps.append(np.full(len(kept), step))
-    return Cloud(KDTree(np.concatenate(states)), np.concatenate(actions), np.concatenate(steps))
+    return Cloud(nearest(np.concatenate(states)), np.concatenate(actions), np.concatenate(steps))
 
 
 def _all_before(

@@ -61,8 +61,8 @@ class ServoSettings(TaskSettings):
     on average, or somewhat more, while a reference moves.
 
     Pressure in both makes a joint stiff, damps it, and makes a pulse move it less; it also takes more air to move. By
-    default every other agent keeps 0.25, which is fast, and the others 0.45, and the better one in simulation is
-    chosen; one that then does not settle on its arm is made anew with the higher one.
+    default pneumarm tries 0.25, which is fast, and 0.45, and keeps the better in simulation; if that does not settle
+    on its arm, it is trained again with the higher one.
     """
     slack: Annotated[NonNegativeFloat, PythonOnly] = 6.0
     """Price of the pressure that a muscle is short of that, by the whole range of pressures."""
@@ -83,8 +83,8 @@ class ServoSettings(TaskSettings):
     alert: Annotated[NonNegativeFloat, PythonOnly] = 0.25
     """Mean error, in tolerances, from which on it no longer is."""
     planned: Annotated[int, Meta(ge=0, le=10_000)] = 20
-    """How often plans for the next half second are made better in the simulation, at every turn, where a moving
-    reference is followed more closely by plans than by the policy alone; 0: the policy alone."""
+    """How often plans for the next half second are made better in the simulation, at every control step, where a
+    moving reference is followed more closely by plans than by the policy alone; 0: the policy alone."""
     ways: Annotated[tuple[NonNegativeFloat, ...], PythonOnly] = ()
     """How far off its goals each joint of the arm was on average, in tolerances: swinging and left alone, swinging
     and damped, moved by single pulses, moved in every period. Learned on the arm; by default nothing is known."""

@@ -7,7 +7,7 @@ const WINDOW = 2000; // ms over which it is seen how fast the arm's time passes
 const FAST = 1.5; // times as fast as the clock on the wall
 
 export const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
-export const asDegrees = (angle) => `${angle.toFixed(1)}°`.replace("-", "\u2212");
+export const asDegrees = (angle) => `${(Math.round(10 * angle) / 10 + 0).toFixed(1)}°`.replace("-", "\u2212");
 
 export const lasted = (seconds) => (seconds < 90 ? `${Math.max(seconds, 0).toFixed(0)} s` : `${(seconds / 60).toFixed(0)} min`);
 

@@ -24,7 +24,7 @@ class CurveMark(NamedTuple):
 
 
 _MARKS = {"noticed": (MIDDLE, "v", "change noticed"), "accepted": (DARK, "^", "new version")}
-_MARKS["rolled back"] = (INK, "X", "version taken back")
+_MARKS["rolled back"] = (INK, "X", "version rolled back")
 
 
 @styled

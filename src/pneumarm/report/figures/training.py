@@ -1,4 +1,4 @@
-"""The training in the simulation: what learning went like, and the spread of the agents (thesis section 4.3)."""
+"""The training in the simulation: what learning went like (thesis section 4.3)."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm.seam import ArmSpec
-from pneumarm.drawing.colours import DARK, GREY, INK, LIGHT, MIDDLE
-from pneumarm.report.style import Described, key, legend_below, nothing, panels, styled, whole_ticks
+from pneumarm.drawing.colours import DARK, GREY, MIDDLE
+from pneumarm.report.style import Described, key, legend_below, nothing, panels, styled
 
 Array = NDArray[np.float64]
 
@@ -59,7 +59,10 @@ def training_curves(
             place.plot(curves[agent, upto, 0] / 1e3, factor * values[agent, upto], **style, marker=marker)
         if not evaluated.any():
             nothing(place, "no agent was trained")
-    handles, words = [key(DARK, lw=1.8), key(GREY, lw=0.6)], ["chosen agent", f"the other {agents - 1}"]
+    handles, words = (
+        [key(DARK, lw=1.8), key(GREY, lw=0.6)],
+        ["chosen agent", "the other" if agents == 2 else f"the other {agents - 1}"],
+    )
     if evaluated.any() and {"performance", CRITERION} <= set(columns):
         best = curves[chosen, : int(evaluated[chosen])]
         of["performance"][0].plot(best[:, 0] / 1e3, best[:, columns.index(CRITERION)], color=MIDDLE, ls="--")
@@ -101,49 +104,3 @@ def _limit(of: Mapping[str, tuple[Any, Array]], evaluated: NDArray[np.int64], sp
         elif name == "reward" and known.size:
             best = float(known.max())
             place.set_ylim(max(float(known.min()), best - _WORST), best + 5)
-
-
-@styled
-def spread_of_agents(reward: Array, success: Array, chosen: int, *, priced: bool = False) -> Described:
-    """Draw the validation of all agents, ordered by reward.
-
-    Args:
-        reward: mean reward of each agent in the validation, shape (agents,).
-        success: its success rate, shape (agents,).
-        chosen: index of the chosen agent.
-        priced: the reward is a price, negative, and a success is to be within the tolerance at the end.
-
-    """
-    figure, axes = panels(1, 2, 2.6)
-    figure.alt = "No agent was trained."
-    order = np.argsort(-reward, kind="stable")
-    rank = np.arange(1, len(order) + 1)
-    picked = order == chosen
-    for place, values, label in (
-        (axes[0, 0], -reward if priced else reward, "price of a movement [-]" if priced else "reward an episode [-]"),
-        (axes[0, 1], 100 * success, "within tolerance at the end [%]" if priced else "success [%]"),
-    ):
-        place.set_xlabel("agent, best first [-]")
-        place.set_ylabel(label)
-        whole_ticks(place)
-        if len(order) == 0:
-            nothing(place, "no agent was trained")
-            continue
-        place.plot(rank[~picked], values[order][~picked], "o", color=LIGHT, mec=INK, mew=0.6, ms=5, label="others")
-        place.plot(rank[picked], values[order][picked], "D", color=DARK, mec=INK, mew=0.6, ms=7, label="chosen")
-        place.set_xlim(0.4, len(order) + 0.6)
-        place.margins(y=0.15)
-        place.ticklabel_format(axis="y", useOffset=False)
-    if len(order):
-        axes[0, 0].legend(loc="lower left")
-        # There is nothing above 100 %, and marks at the ends are seen whole.
-        lowest = 100 * float(success.min())
-        axes[0, 1].set_ylim(lowest - 0.05 * max(100.5 - lowest, 1.0), 100.5)
-        sign, paid, won = (-1, "price", "share within tolerance at the end") if priced else (1, "reward", "success")
-        low, middle, high = sorted(sign * np.percentile(reward, (0, 50, 100)))
-        figure.alt = (
-            f"Validation of {len(reward)} agents from different initial weights: {paid} from {low:.2f} to "
-            f"{high:.2f}, median {middle:.2f}; {won} from {success.min():.1%} to {success.max():.1%}. "
-            f"The chosen agent has {paid} {sign * reward[chosen]:.2f} and {won} {success[chosen]:.1%}."
-        )
-    return figure

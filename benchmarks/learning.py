@@ -19,7 +19,8 @@ from pneumarm.arm import Reading
 from pneumarm.control import AgentController
 from pneumarm.kernels import kernel
 from pneumarm.learning import TrainSettings, test, train
-from pneumarm.learning.online.loop import Schedule, loop_workspace, train_episode
+from pneumarm.learning.online.loop import loop_workspace, train_episode
+from pneumarm.learning.online.schedule import Schedule
 from pneumarm.learning.online.values import Networks, draw_networks, learner, pack, unpack
 from pneumarm.random import normal, random_state, uniform
 from pneumarm.task.environment import Environment, environment, episode

@@ -408,7 +408,7 @@ def test_help_has_two_levels(capsys: pytest.CaptureFixture[str]) -> None:
     few, everything = (Outcome(capsys, "run", level).out for level in ("--help", "--help-all"))
     assert few.count("--") < 30
     assert few.count("\n") <= 30
-    assert int(re.findall(r"Show (\d+) more options", few)[0]) <= 100
+    assert int(re.findall(r"Show (\d+) more options", few)[0]) <= 105
     assert "--servo.tolerance" not in few
     assert "--help-all" in few
     assert "(thesis" not in few

@@ -14,7 +14,7 @@ from pneumarm.control.playing import Player
 from pneumarm.errors import UnusableInput
 from pneumarm.learning import Agent, Exploration, TrainSettings
 from pneumarm.learning.online.agent import OnlineLearner
-from pneumarm.learning.online.loop import Schedule
+from pneumarm.learning.online.schedule import Schedule
 from pneumarm.learning.online.values import draw_networks
 from pneumarm.task.movements import join_movements
 

@@ -35,7 +35,7 @@ from pneumarm.experiments.results import write_page
 from pneumarm.experiments.sweep import sweep
 from pneumarm.experiments.transfer import conditions
 from pneumarm.learning import Shaping
-from pneumarm.learning.online.loop import Schedule
+from pneumarm.learning.online.schedule import Schedule
 from pneumarm.simulation import Simulation
 from pneumarm.simulation.kernel import raw_observation
 from pneumarm.task import Reward, begin_states

@@ -11,7 +11,8 @@ from pneumarm.errors import UnusableInput
 from pneumarm.learning import LearnSettings, find_method, load_agent, test, train
 from pneumarm.learning.hierarchy import HIERARCHY, HierarchicalAgent, HierarchySettings
 from pneumarm.learning.hierarchy.loop import begin_levels, go_on, hierarchy, level_memory, upper_shape
-from pneumarm.learning.online.loop import Schedule, remember
+from pneumarm.learning.online.loop import remember
+from pneumarm.learning.online.schedule import Schedule
 from pneumarm.learning.online.values import draw_networks, pack
 from pneumarm.random import random_state
 from pneumarm.simulation import Simulation

@@ -12,7 +12,8 @@ from synthetic_arm import synthetic_begin_states, synthetic_simulation
 
 from children import python
 from pneumarm.learning import TrainSettings
-from pneumarm.learning.online.loop import Schedule, loop_workspace, train_episode, train_episodes
+from pneumarm.learning.online.loop import loop_workspace, train_episode, train_episodes
+from pneumarm.learning.online.schedule import Schedule
 from pneumarm.learning.online.values import draw_networks, learner, network_shapes, pack, unpack
 from pneumarm.random import random_state
 from pneumarm.simulation.noise import NoiseSettings

@@ -6,7 +6,8 @@ from synthetic_arm import synthetic_begin_states, synthetic_simulation
 
 from pneumarm.errors import PneumarmError, UnusableInput
 from pneumarm.learning import Agent, Exploration, OnlineLearner, TrainSettings
-from pneumarm.learning.online.loop import Schedule, loop_workspace, train_episode
+from pneumarm.learning.online.loop import loop_workspace, train_episode
+from pneumarm.learning.online.schedule import Schedule
 from pneumarm.learning.online.values import draw_networks, learner
 from pneumarm.random import random_state
 from pneumarm.simulation.noise import NoiseSettings

@@ -11,7 +11,7 @@ from pneumarm.arm.valves import NEVER
 from pneumarm.errors import PneumarmError, UnusableInput
 from pneumarm.files import read_arrays, write_arrays
 from pneumarm.learning import METHODS, Learns, LearnSettings, load_agent, test, train
-from pneumarm.learning.online.loop import Schedule
+from pneumarm.learning.online.schedule import Schedule
 from pneumarm.learning.values import VALUES, ValueAgent, ValueSettings
 from pneumarm.learning.values.agent import KIND
 from pneumarm.learning.values.learner import value_memory, weigh
@@ -268,6 +268,10 @@ def test_what_does_not_fit_together_is_said(chosen: dict, words: str) -> None:
 def test_options_of_the_command_line() -> None:
     learn = LearnSettings(method="q-lambda", own={"approximator": "kanerva", "centres": "80", "policy": "boltzmann"})
     assert learn.chosen == VALUES["q-lambda"].settings(approximator="kanerva", centres=80, policy="boltzmann")
+    parts = LearnSettings(method="td", own={"goal": "[10]", "help": '{"retry": 0.5}', "noise": '{"kind": "uniform"}'})
+    assert (parts.chosen.goal, parts.chosen.help.retry, parts.chosen.noise.kind) == ((10.0,), 0.5, "uniform")
+    with pytest.raises(UnusableInput, match="JSON"):
+        LearnSettings(method="td", own={"help": "{retry"})
     with pytest.raises(UnusableInput, match="no setting approximate"):
         LearnSettings(method="q-lambda", own={"approximate": "radial"})
     with pytest.raises(UnusableInput, match="rule"):

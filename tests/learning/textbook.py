@@ -8,7 +8,7 @@ import numpy as np
 from synthetic_arm import synthetic_simulation
 
 from pneumarm.kernels import direct
-from pneumarm.learning.online.loop import Schedule
+from pneumarm.learning.online.schedule import Schedule
 from pneumarm.learning.values.approximators.coding import Coding
 from pneumarm.learning.values.approximators.function import ValueFunction, value_function
 from pneumarm.learning.values.approximators.table import table

@@ -247,6 +247,22 @@ def test_a_store_is_filtered_fitted_and_judged(make_rows: Callable[..., Rows], t
             refiltered(store, other)
 
 
+def test_the_grid_of_the_filter_can_be_chosen_and_is_kept(make_rows: Callable[..., Rows], tmp_path: Path) -> None:
+    stored(tmp_path / "store.db", make_rows(sequences=60, steps=50))
+    options = FitSettings(epochs=2, hidden=4, grid=GridSettings(angle_bins=4, velocity_bins=4, per_cell=1))
+    with Store.open(tmp_path / "store.db") as store:
+        result, filtered = fit_store(store, options)
+        usual = fit_store(store, replace(options, grid=GridSettings())).result
+        assert filtered.filter.settings == options.grid
+        assert result.rows < usual.rows
+        for simulation in (result.simulation, usual.simulation):
+            simulation.save(tmp_path / "arm.sim")
+            loaded = Simulation.load(tmp_path / "arm.sim")
+            assert loaded.grid == simulation.grid
+            again = refiltered(store, loaded)
+            assert len(again.transitions.sequence) == (result if simulation.grid == options.grid else usual).rows
+
+
 def test_the_fewest_transitions_allowed_can_be_fitted_with_any_seed(
     make_rows: Callable[..., Rows], tmp_path: Path
 ) -> None:
@@ -256,11 +272,11 @@ def test_the_fewest_transitions_allowed_can_be_fitted_with_any_seed(
         numbers = [entry.number for entry in store.catalogue()]
         unlucky = [seed for seed in range(100) if not held_out(numbers, 0.1, seed).any()]
         for seed in unlucky[:3]:
-            result, filtered = fit_store(store, FitSettings(epochs=3, hidden=3, seed=seed), everything)
+            result, filtered = fit_store(store, FitSettings(epochs=3, hidden=3, seed=seed, grid=everything))
             assert result.held_out.rows == 200
             assert result.rows == 1800
             assert result.generalisation is None  # the filter left nothing out
-            again = refiltered(store, result.simulation, everything)
+            again = refiltered(store, result.simulation)
             np.testing.assert_array_equal(again.transitions.inputs, filtered.transitions.inputs)
 
 

@@ -28,8 +28,8 @@ from pneumarm.transitions.rows import Rows
 from pneumarm.transitions.rows import join_rows as joined_rows
 
 Make = Callable[..., Rows]
-SETTINGS = FitSettings(epochs=15, hidden=6, ahead=0.0, spread=False, history=3)
 EVERYTHING = GridSettings(per_cell=1_000_000)
+SETTINGS = FitSettings(epochs=15, hidden=6, ahead=0.0, spread=False, history=3, grid=EVERYTHING)
 
 
 def at_rest(rows: Rows, which: np.ndarray, noise: float = 0.0) -> Rows:
@@ -54,7 +54,7 @@ def stored(path: Path, rows: Rows) -> Path:
 
 def fitted(path: Path, settings: FitSettings = SETTINGS) -> StoreFit:
     with Store.open(path) as store:
-        return fit_store(store, settings, EVERYTHING)
+        return fit_store(store, replace(settings, grid=EVERYTHING))
 
 
 def test_what_moves_is_held_out_where_the_usual_sequences_stand_still(make_rows: Make, tmp_path: Path) -> None:
@@ -97,7 +97,7 @@ def test_of_a_single_sequence_stretches_are_held_out_that_no_fitted_window_reach
         still = at_rest(replace(still, sequence=still.sequence + 1), still.step >= 0)
         rows = joined_rows([rows, still])
     with Store.open(stored(tmp_path / "store.db", rows)) as store:
-        made = fit_store(store, SETTINGS, EVERYTHING)
+        made = fit_store(store, SETTINGS)
         simulation = made.simulation
         assert simulation.stretch > 0
         assert all(0 < error < 1 for error in made.result.relative_error.values())
@@ -114,7 +114,7 @@ def test_of_a_single_sequence_stretches_are_held_out_that_no_fitted_window_reach
         assert not read[0] & read[1]
         simulation.save(tmp_path / "sim")
         loaded = Simulation.load(tmp_path / "sim")
-        again = refiltered(store, loaded, EVERYTHING)
+        again = refiltered(store, loaded)
         np.testing.assert_array_equal(again.transitions.inputs, made.filtered.transitions.inputs)
         found = analyse(store, loaded, again).figures
         assert found["held_out"]["relative_error"] == pytest.approx(made.result.relative_error)
@@ -192,7 +192,7 @@ def test_of_a_large_store_a_part_is_used_evenly_drawn(make_rows: Make, tmp_path:
         few = part.blocks(sequences=lambda sequence: sequence <= 50)
         assert {n for rows in few for n in rows.sequence.tolist()} == {n for n in numbers if n <= 50}
         assert new_cells(part, Window(1)).whole.seen == 1980
-        made = fit_store(part, SETTINGS, EVERYTHING)
+        made = fit_store(part, SETTINGS)
         assert made.result.rows + made.result.held_out.rows == 1980
         assert made.results()["remarks"] == part.used
         assert analyse(part, made.simulation).figures["remarks"] == part.used

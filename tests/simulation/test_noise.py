@@ -25,7 +25,7 @@ def simulation(velocity: str = "derived", joints: int = 1) -> Simulation:
     offset, scale = np.tile([512.0, 0.1, 90.0, 90.0], joints), np.tile([400.0, 5.0, 90.0, 80.0], joints)
     scaling = Scaling(offset, scale, np.ones(2 * joints))
     std = np.array([[6.7, 0.2, 1.9, 1.5], [3.0, 0.1, 1.0, 2.0]])[:joints]
-    goals, limits = np.tile([200.0, 800.0], (joints, 1)), np.tile([-9999.0, 9999.0], (joints, 4, 1))
+    goals, limits = np.tile([200.0, 800.0], (joints, 1)), np.tile([-9999.0, 9999.0], (joints, 2, 1))
     spec = ArmSpec(joints=joints)
     return Simulation(spec, window, scaling, (network,), velocity, std, goals, limits)  # type: ignore[arg-type]
 
@@ -86,6 +86,18 @@ def test_white_noise_factor_and_slow_arm() -> None:
     white = injected(NoiseSettings(kind="white", factor=0.5), simulation())
     np.testing.assert_allclose(white.std(axis=0), 0.2 * 0.5 * np.array([6.7, 1.9, 1.5]), rtol=0.01)
     assert abs(np.corrcoef(white[1:, 0], white[:-1, 0])[0, 1]) < 0.01
+
+
+@pytest.mark.parametrize("velocity", ["derived", "network"])
+def test_uniform_noise_is_a_share_of_the_range(velocity: str) -> None:
+    """Of 1,023 counts of the angle 1 % are 10; pressures are within 9,999 here, velocities have twice their scale."""
+    got = injected(NoiseSettings(kind="uniform", share=0.01, by_velocity=False), simulation(velocity))
+    most = np.array([10.23, 0.1, 199.98, 199.98])[[0, 2, 3] if velocity == "derived" else slice(None)]
+    np.testing.assert_allclose(np.abs(got).max(axis=0), most, rtol=0.001)
+    np.testing.assert_allclose(got.std(axis=0), most / math.sqrt(3), rtol=0.01)
+    assert abs(np.corrcoef(got[1:, 0], got[:-1, 0])[0, 1]) < 0.01
+    slow = injected(NoiseSettings(kind="uniform", share=0.01), simulation(velocity))
+    np.testing.assert_allclose(slow.std(axis=0), 0.2 * most / math.sqrt(3), rtol=0.01)
 
 
 def test_network_for_the_velocity_and_two_joints() -> None:

@@ -30,7 +30,8 @@ from pneumarm.arm.virtual.valve import command
 from pneumarm.errors import UnusableInput
 from pneumarm.kernels import borrowed, inner, kernel, part
 from pneumarm.learning.online.agent import Agent, begin_acting, learn_and_act
-from pneumarm.learning.online.loop import Schedule, Workspace, loop_workspace
+from pneumarm.learning.online.loop import Workspace, loop_workspace
+from pneumarm.learning.online.schedule import Schedule
 from pneumarm.learning.online.settings import Exploration
 from pneumarm.learning.online.values import ActionValues, learner
 from pneumarm.random import random_state

@@ -10,7 +10,7 @@ from pneumarm.control.agent import AgentController, warm_up
 from pneumarm.control.movement import move
 from pneumarm.control.playing import Array, Player
 from pneumarm.learning.online.agent import Agent, OnlineLearner
-from pneumarm.learning.online.loop import Schedule
+from pneumarm.learning.online.schedule import Schedule
 from pneumarm.learning.online.settings import Exploration
 from pneumarm.random import random_state
 from pneumarm.task.begin import draw_goal_near

@@ -28,7 +28,7 @@ ALL = tuple(part for name in ("reward", "actions", "switches") for part in (name
 
 
 def _goal(criterion: str) -> Goal:
-    return "larger" if criterion.removeprefix(EXPLORING) in ("reward", "gain") else "smaller"
+    return "larger" if criterion.removeprefix(EXPLORING) in ("reward", "gain", "success_rate") else "smaller"
 
 
 _IN_WORDS = {**CRITERIA, "gain": "change of the reward by training on"}

@@ -1,17 +1,19 @@
 """What most experiments need of an arm: transitions, a simulation fitted to them, begin states."""
 
 import json
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from pneumarm.arm import open_arm
 from pneumarm.errors import UnusableInput
 from pneumarm.experiments.experiment import LaboratorySettings
 from pneumarm.files import read_json, write_json, write_text
+from pneumarm.learning import Help
 from pneumarm.progress import Report
 from pneumarm.simulation import SINGLE_STEPS, Simulation, fit_store
 from pneumarm.task import BeginStates, begin_states
-from pneumarm.transitions import WHOLE_PERIODS, CollectSettings, Store, collect
+from pneumarm.transitions import WHOLE_PERIODS, CollectSettings, GridSettings, Store, collect
 
 STORE = "transitions.db"
 SIMULATION = "simulation.safetensors"
@@ -19,6 +21,15 @@ PLAN = "faults.toml"
 SETTINGS = "settings.json"
 PROCEDURES = {"thesis": WHOLE_PERIODS, "ours": CollectSettings(pulses=0.0)}
 """How arms are recorded, by the name of the procedure; the thesis' agents know no pulses."""
+_LATER = {
+    "help": asdict(Help()),
+    "goal": [],
+    "sides": "place",
+    "each": False,
+    "share": 0.01,
+    "grid": asdict(GridSettings()),
+}
+"""Settings of later versions, and their usual values."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +78,7 @@ def claim(folder: Path, wanted: object) -> None:
     """
     folder.mkdir(parents=True, exist_ok=True)
     file = folder / SETTINGS
-    wanted = json.loads(json.dumps(wanted))
+    wanted = as_ever(json.loads(json.dumps(wanted)))
     if not file.exists():
         write_json(file, wanted)
         return
@@ -77,6 +88,14 @@ def claim(folder: Path, wanted: object) -> None:
             f"{folder}: was begun with other settings ({_difference(found, wanted)}); give the same ones or another "
             "folder with --out"
         )
+
+
+def as_ever(wanted: Any) -> Any:
+    """Return ``wanted`` (JSON) without later settings that are as usual: laboratories of before are gone on with."""
+    if isinstance(wanted, dict):
+        usual = {name for name, value in wanted.items() if name in _LATER and value == _LATER[name]}
+        return {name: as_ever(value) for name, value in wanted.items() if name not in usual}
+    return [as_ever(one) for one in wanted] if isinstance(wanted, list) else wanted
 
 
 def _difference(found: object, wanted: object) -> str:

@@ -19,7 +19,7 @@ from pneumarm.control import AgentController, drawn, make_movements
 from pneumarm.control.agent import warm_up
 from pneumarm.errors import UnusableInput
 from pneumarm.experiments.experiment import Figures, LaboratorySettings, run_seed
-from pneumarm.experiments.preparation import PROCEDURES, SIMULATION, STORE, claim
+from pneumarm.experiments.preparation import PROCEDURES, SIMULATION, STORE, as_ever, claim
 from pneumarm.files import read_json, write_json
 from pneumarm.learning import Acts, Method, TrainSettings, test, train
 from pneumarm.progress import Report
@@ -170,7 +170,8 @@ def prepared(arm: str, folder: Path, recipe: Recipe, settings: LaboratorySetting
 
 def trial_folder(folder: Path, wanted: object) -> Path:
     """Return the folder below an arm's ``folder`` of what ``wanted`` (JSON) makes, whichever experiment asks."""
-    digest = hashlib.sha256(json.dumps(wanted, sort_keys=True).encode()).hexdigest()[:12]
+    told = json.dumps(as_ever(json.loads(json.dumps(wanted))), sort_keys=True)
+    digest = hashlib.sha256(told.encode()).hexdigest()[:12]
     claim(folder / digest, wanted)
     return folder / digest
 

@@ -14,7 +14,8 @@ from pneumarm.errors import UnusableInput
 from pneumarm.experiments.experiment import Experiment, Figures, LaboratorySettings, run_seed
 from pneumarm.experiments.preparation import Simulated, simulated
 from pneumarm.learning import TrainSettings, test
-from pneumarm.learning.online.loop import Schedule, loop_workspace, train_episodes
+from pneumarm.learning.online.loop import loop_workspace, train_episodes
+from pneumarm.learning.online.schedule import Schedule
 from pneumarm.learning.online.testing import run_test
 from pneumarm.learning.online.training import train_online
 from pneumarm.learning.online.values import learner

@@ -28,7 +28,7 @@ from pneumarm.learning.methods import (
     train,
 )
 from pneumarm.learning.online.agent import Agent, OnlineLearner
-from pneumarm.learning.online.settings import Exploration, Shaping, TrainSettings
+from pneumarm.learning.online.settings import Exploration, Help, Shaping, TrainSettings
 from pneumarm.learning.online.training import CURVES
 from pneumarm.learning.policy.agent import PolicyAgent
 from pneumarm.learning.policy.settings import PolicySettings
@@ -45,6 +45,7 @@ __all__ = [
     "AnyAgent",
     "BatchedSettings",
     "Exploration",
+    "Help",
     "Knows",
     "LearnSettings",
     "Learner",

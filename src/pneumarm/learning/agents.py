@@ -219,7 +219,7 @@ class SimulationAgent(ReachesGoals):
     @property
     def goal_range(self) -> NDArray[np.float64]:
         """Goals that it reaches, shape (joints, 2) [counts]."""
-        return self.simulation.goal_range
+        return self.goals.range
 
     @property
     def goals(self) -> Goals:

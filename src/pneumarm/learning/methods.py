@@ -175,7 +175,9 @@ class LearnSettings(Settings):
     thesis: TrainSettings = field(default_factory=TrainSettings)
     """Settings of the methods sarsa and q-learning."""
     own: dict[str, Any] = field(default_factory=dict)
-    """Settings of hierarchy, of esp, of a rule of section 4.2, or of a method of your own, as --own.NAME VALUE."""
+    """Settings of hierarchy, of esp, of a rule of section 4.2, or of a method of your own, as --own.NAME VALUE.
+
+    What has parts is written as JSON: --own.goal [10] or --own.help '{"retry": 0.5}'."""
 
     def _valid(self) -> Valid:
         _ = self.chosen  # it says what is wrong with the method or with settings of one's own
@@ -207,10 +209,18 @@ class LearnSettings(Settings):
                 f"method {self.method}: has no setting {', '.join(unknown)}; it has {', '.join(known)}"
             )
         try:
-            found = msgspec.convert({**self.own, **method.fixed}, method.settings, strict=False)
+            own = {name: _of_json(value) for name, value in self.own.items()}
+            found = msgspec.convert({**own, **method.fixed}, method.settings, strict=False)
             return replace(found)  # msgspec leaves defaults in the class, where vars() does not see them
         except msgspec.ValidationError as error:
             raise UnusableInput(f"method {self.method}: expected {in_words(error)}") from error
+        except msgspec.DecodeError as error:
+            raise UnusableInput(f"method {self.method}: expected JSON after [ or {{; {error}") from error
+
+
+def _of_json(value: Any) -> Any:
+    """Return ``value``, or where that is text that begins like a list or a table in JSON, what it says."""
+    return msgspec.json.decode(value) if isinstance(value, str) and value[:1] in ("[", "{") else value
 
 
 def train(

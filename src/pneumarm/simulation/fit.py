@@ -9,7 +9,7 @@ import os
 import time
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Annotated, Any, Literal, NamedTuple, Self
 
 import numpy as np
@@ -120,6 +120,8 @@ class FitSettings(Settings):
     the arm moves. Where too few do, stretches within sequences are held out."""
     seed: NonNegativeInt = 0
     """Random seed of initial weights and of every other random choice."""
+    grid: GridSettings = field(default_factory=GridSettings)
+    """The grid by which the recording is filtered."""
 
     def _valid(self) -> Valid:
         return {"sensors": len(set(self.sensors)) == len(self.sensors) or "each of them once"}
@@ -596,7 +598,6 @@ class StoreFit(NamedTuple):
 def fit_store(
     store: Store,
     settings: FitSettings | None = None,
-    grid: GridSettings | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> StoreFit:
     """Filter the transitions of ``store``, fit a simulation to them, and measure its errors on the others.
@@ -619,7 +620,7 @@ def fit_store(
     window = _window(store.spec, settings)
     share, stretch = choose_held_out(store, settings.held_out, settings.seed, window.history)
     settings, source = replace(settings, held_out=share), Stretched(store, stretch)
-    filtered = filter_transitions(source, window, grid, seed=settings.seed, hold_out=share)
+    filtered = filter_transitions(source, window, settings.grid, seed=settings.seed, hold_out=share)
     coverage = filtered.coverage
     result = fit(
         filtered.transitions,
@@ -633,7 +634,7 @@ def fit_store(
         progress=progress,
     )
     goals = seen_goals(store.blocks, result.simulation.goal_range)
-    simulation = replace(result.simulation.with_goals(goals), stretch=stretch)
+    simulation = replace(result.simulation.with_goals(goals), stretch=stretch, grid=settings.grid)
     return StoreFit(result._replace(simulation=simulation, used=store.used), filtered)
 
 
@@ -649,7 +650,7 @@ def fitted_on(
     window, seed = simulation.window, simulation.seed
     layers: Literal[1, 2] = 1 if simulation.networks[0].second_weights is None else 2
     source = Stretched(store, simulation.stretch)
-    filtered = filter_transitions(source, window, seed=seed, hold_out=simulation.held_out)
+    filtered = filter_transitions(source, window, simulation.grid, seed=seed, hold_out=simulation.held_out)
     training = filtered.transitions
     if newest is not None and layers == 2:
         ends = newest.step - window.history, newest.step + 1  # of the rows that a transition is made of
@@ -676,7 +677,7 @@ def _goal_range(store: Store) -> NDArray[np.float64]:
     return seen if store.spec.muscles == 2 else held_range(store.blocks, seen, store.spec.period)
 
 
-def refiltered(store: Store, simulation: Simulation, grid: GridSettings | None = None) -> Filtered:
+def refiltered(store: Store, simulation: Simulation) -> Filtered:
     """Return the parts of ``store`` as they were when ``simulation`` was fitted to it, for an analysis.
 
     Raises:
@@ -689,4 +690,5 @@ def refiltered(store: Store, simulation: Simulation, grid: GridSettings | None =
             "give those that belong together"
         )
     source = Stretched(store.drawn(), simulation.stretch)
-    return filter_transitions(source, simulation.window, grid, seed=simulation.seed, hold_out=simulation.held_out)
+    apart = simulation.seed, simulation.held_out
+    return filter_transitions(source, simulation.window, simulation.grid, seed=apart[0], hold_out=apart[1])

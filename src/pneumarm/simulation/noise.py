@@ -23,8 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.kernels import part
-from pneumarm.random import normal
-from pneumarm.settings import NonNegativeFloat, PositiveInt, Settings, Share, Valid
+from pneumarm.random import normal, uniform
+from pneumarm.settings import NonNegativeFloat, PositiveFloat, PositiveInt, Settings, Share, Valid
 from pneumarm.simulation.simulation import Simulation
 
 
@@ -32,8 +32,11 @@ from pneumarm.simulation.simulation import Simulation
 class NoiseSettings(Settings):
     """How much noise the simulation's predictions get, and of what kind."""
 
-    kind: Literal["correlated", "white", "none"] = "correlated"
-    """Correlated over some steps (thesis: section 3.4), independent from step to step, or no noise at all."""
+    kind: Literal["correlated", "white", "uniform", "none"] = "correlated"
+    """Correlated over some steps (thesis: section 3.4), independent from step to step, uniform within a share of the
+    range as the thesis' [10] has it, or no noise at all."""
+    share: PositiveFloat = 0.01
+    """Largest uniform noise, as a share of the range of each quantity ([10]: about 0.01 to 0.1)."""
     factor: NonNegativeFloat = 1.0
     """Standard deviation of the noise in standard deviations of the fit's error (thesis: 1)."""
     steps: PositiveInt = 5
@@ -55,7 +58,9 @@ class NoiseParameters(NamedTuple):
     """The noise as a kernel needs it; arrays of length 0 where there is none. Made by :func:`noise_parameters`."""
 
     std: NDArray[np.float32]
-    """Standard deviation by output of the networks, shape (outputs,) [scaled]."""
+    """Standard deviation by output of the networks, or its largest noise, shape (outputs,) [scaled]."""
+    is_uniform: bool
+    """Whether noise is uniform: then nothing else of it is Gaussian or an average."""
     keep: float
     """(n - 1)/n."""
     gain: float
@@ -77,6 +82,8 @@ def noise_parameters(settings: NoiseSettings, simulation: Simulation) -> NoisePa
     scale, further = window.of_joints(scaling.observation_scale), len(window.further)
     derived = simulation.velocity == "derived"
     std = settings.factor * (simulation.errors / scaling.observation_scale)[simulation.outputs]
+    if settings.kind == "uniform":
+        std = settings.share * ranges(simulation)[simulation.outputs] / scaling.observation_scale[simulation.outputs]
     outputs = (std.size - further) // joints
     if settings.kind == "none" or settings.factor == 0:
         std = std[:0]
@@ -92,6 +99,7 @@ def noise_parameters(settings: NoiseSettings, simulation: Simulation) -> NoisePa
     share = settings.slow_share if settings.by_velocity else 1.0
     return NoiseParameters(
         std=np.ascontiguousarray(std, np.float32),
+        is_uniform=settings.kind == "uniform",
         keep=(n - 1) / n,
         gain=math.sqrt(2 * n - 1) / n,
         source=np.stack([output, 4 * first + 1], axis=1),
@@ -99,6 +107,15 @@ def noise_parameters(settings: NoiseSettings, simulation: Simulation) -> NoisePa
         speed=speed.astype(np.float32),
         ramp=np.array([share, settings.slow, (1 - share) / (settings.fast - settings.slow)], np.float32),
     )
+
+
+def ranges(simulation: Simulation) -> NDArray[np.float64]:
+    """Return the range of each place in an observation, shape (observation_size,) [sensor units].
+
+    That of angles and pressures is of their sensors or what was predicted; of velocities twice their scale.
+    """
+    low, high = simulation.limits
+    return np.where(np.isfinite(high - low), high - low, 2 * simulation.scaling.observation_scale)
 
 
 @part
@@ -118,6 +135,15 @@ def noise_share(noise, joint, x, change):  # type: ignore[no-untyped-def]
 
 
 @part
+def deviate(noise, average, o, random):  # type: ignore[no-untyped-def]
+    """Return the noise of output ``o`` in units of its ``noise.std``; its ``average`` goes on if it has one."""
+    if noise.is_uniform:
+        return np.float32(2.0 * uniform(random) - 1.0)
+    average[o] = noise.keep * average[o] + noise.gain * normal(random)
+    return average[o]
+
+
+@part
 def add_noise(noise, x, change, average, random):  # type: ignore[no-untyped-def]
     """Add noise to ``change`` (outputs,), the scaled change that the networks predict from the state ``x``."""
     if noise.std.shape[0] == 0:
@@ -126,8 +152,6 @@ def add_noise(noise, x, change, average, random):  # type: ignore[no-untyped-def
     for joint in range(noise.speed.shape[0]):
         share = noise_share(noise, joint, x, change)
         for o in range(joint * outputs, (joint + 1) * outputs):
-            average[o] = noise.keep * average[o] + noise.gain * normal(random)
-            change[o] += share * noise.std[o] * average[o]
+            change[o] += share * noise.std[o] * deviate(noise, average, o, random)
     for o in range(noise.std.shape[0] - noise.further, noise.std.shape[0]):
-        average[o] = noise.keep * average[o] + noise.gain * normal(random)
-        change[o] += noise.std[o] * average[o]
+        change[o] += noise.std[o] * deviate(noise, average, o, random)

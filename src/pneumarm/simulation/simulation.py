@@ -23,6 +23,7 @@ from pneumarm.errors import UnusableInput
 from pneumarm.files import read_arrays, write_arrays
 from pneumarm.networks.network import Network
 from pneumarm.transitions.goals import Goals
+from pneumarm.transitions.grid import GridSettings
 from pneumarm.transitions.window import QUANTITIES, Transitions, Window
 
 Velocity = Literal["derived", "network"]
@@ -106,6 +107,8 @@ class Simulation:
     """Where not whole sequences were held out, but stretches of them: the rows of these."""
     seed: int = 0
     """Of that choice, of the filter and of the fit, so that an analysis finds the same parts again."""
+    grid: GridSettings = field(default_factory=GridSettings)
+    """The grid that the recording was filtered by, likewise."""
     further_std: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
     """As ``error_std``, of the further sensors in the window, shape (further,) [sensor units]."""
     further_range: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
@@ -225,9 +228,10 @@ class Simulation:
         for number, network in enumerate(self.networks):
             layers = {name: getattr(network, name) for name in (*_LAYERS, "direct", *_SECOND)}
             arrays |= {f"network_{number}_{name}": array for name, array in layers.items() if array is not None}
-        settings = {**asdict(header), "stretch": self.stretch}
-        if not self.stretch:
-            del settings["stretch"]  # older versions read what has none
+        settings = {**asdict(header), "stretch": self.stretch, "grid": asdict(self.grid)}
+        for name, usual in (("stretch", self.stretch == 0), ("grid", self.grid == GridSettings())):
+            if usual:
+                del settings[name]  # older versions read what has none
         return settings, arrays
 
     @classmethod
@@ -269,6 +273,7 @@ class Simulation:
             held_out=header.held_out,
             stretch=header.stretch,
             seed=header.seed,
+            grid=header.grid,
             **rest,
         )
 
@@ -295,6 +300,7 @@ class _Header:
     """For each network whether it has direct connections."""
     spread: bool = False
     stretch: int = 0
+    grid: GridSettings = field(default_factory=GridSettings)
 
 
 def _floats(name: str, array: NDArray[np.generic]) -> NDArray[np.float64]:

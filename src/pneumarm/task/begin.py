@@ -99,16 +99,23 @@ class BeginParameters(NamedTuple):
     """Lowest and highest angle of the sensor, shape (2,) [counts]."""
     weights: NDArray[np.float64]
     """Cumulative probabilities of the sub-intervals of a side, the farthest first, shape (bins,)."""
+    by_length: bool
+    """Whether sides are drawn by the lengths that the deviation leaves them."""
+    shares: NDArray[np.float64]
+    """What of the deviation each joint has, shape (joints,)."""
 
 
 def begin_parameters(
-    begin: BeginStates, domain: tuple[float, float], weights: tuple[float, ...] = (1.0,)
+    begin: BeginStates, domain: tuple[float, float], weights: tuple[float, ...] = (1.0,), by_length: bool = False
 ) -> BeginParameters:
     """Return ``begin`` for a kernel; ``weights`` are those of :class:`~pneumarm.learning.online.settings.Shaping`."""
     cumulative = np.cumsum(weights) / np.sum(weights)
     order = np.ascontiguousarray(np.argsort(begin.angle, axis=0, kind="stable").T)
     sorted_ = np.take_along_axis(begin.angle.T, order, axis=1)
-    return BeginParameters(begin.states, begin.angle, order, sorted_, np.array(domain, np.float64), cumulative)
+    ends = np.array(domain, np.float64)
+    return BeginParameters(
+        begin.states, begin.angle, order, sorted_, ends, cumulative, by_length, np.ones(len(order))
+    )
 
 
 @part
@@ -164,26 +171,32 @@ def draw_begin(begin, goal, deviation, random):  # type: ignore[no-untyped-def]
         return integer(random, begin.states.shape[0])
     for _ in range(_TRIES):
         joint = integer(random, goal.shape[0]) if goal.shape[0] > 1 else 0
-        low, high = draw_interval(begin.domain, begin.weights, goal[joint], deviation, random)
+        lowest, highest, most = begin.domain[0], begin.domain[1], deviation * begin.shares[joint]
+        if begin.by_length:
+            lowest, highest = max(lowest, goal[joint] - most), min(highest, goal[joint] + most)
+        low, high = draw_interval((lowest, highest), begin.weights, goal[joint], most, random)
         first = count_below(begin.sorted[joint], low)
         count = count_below(begin.sorted[joint], high) - first
         if count > 0:
             index = begin.order[joint, first + integer(random, count)]
-            if distance(begin.angle[index], goal) <= deviation:
+            if distance(begin.angle[index], goal, begin.shares) <= deviation:
                 return index
     nearest = 0
     for index in range(1, begin.states.shape[0]):
-        if distance(begin.angle[index], goal) < distance(begin.angle[nearest], goal):
+        if distance(begin.angle[index], goal, begin.shares) < distance(begin.angle[nearest], goal, begin.shares):
             nearest = index
     return nearest
 
 
 @part
-def distance(angle, goal):  # type: ignore[no-untyped-def]
-    """Return the largest difference of ``angle`` and ``goal`` over the joints (thesis eq. 4.13) [counts]."""
+def distance(angle, goal, shares):  # type: ignore[no-untyped-def]
+    """Return the largest difference of ``angle`` and ``goal`` over the joints (thesis eq. 4.13) [counts].
+
+    That of a joint counts the more, the smaller its share of the deviation is (section 6.1.3).
+    """
     largest = 0.0
     for joint in range(goal.shape[0]):
-        largest = max(largest, abs(angle[joint] - goal[joint]))
+        largest = max(largest, abs(angle[joint] - goal[joint]) / shares[joint])
     return largest
 
 

@@ -92,10 +92,11 @@ def environment(simulation: Simulation, begin: BeginStates, settings: TaskSettin
     offset, scale = window.of_joints(scaling.observation_offset), window.of_joints(scaling.observation_scale)
     commands = VALVES[None] / scaling.command_scale.reshape(window.joints, 1, 2)
     commands[..., simulation.spec.muscles :] = 0.0
+    goals = settings.goals_in(simulation)
     task = Task(
-        goal_range=np.ascontiguousarray(simulation.goals.range, np.float64),
-        goal_ways=np.ascontiguousarray(simulation.goals.ways, np.float64),
-        goal_limits=np.ascontiguousarray(simulation.goals.limits, np.float64),
+        goal_range=np.ascontiguousarray(goals.range, np.float64),
+        goal_ways=np.ascontiguousarray(goals.ways, np.float64),
+        goal_limits=np.ascontiguousarray(goals.limits, np.float64),
         unit=np.ascontiguousarray(np.stack([offset[:, 0], scale[:, 0], offset[:, 1], scale[:, 1]], axis=1)),
         commands=np.ascontiguousarray(commands, np.float32),
         layout=layout_of(simulation.window),
@@ -105,7 +106,7 @@ def environment(simulation: Simulation, begin: BeginStates, settings: TaskSettin
     return Environment(
         simulation=simulation_parameters(simulation),
         noise=noise_parameters(settings.noise, simulation),
-        begin=begin_parameters(begin, simulation.spec.angle_range, settings.begin_weights),
+        begin=begin_parameters(begin, simulation.spec.angle_range, settings.begin_weights, settings.by_length),
         task=task,
     )
 

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pneumarm.arm.valves import ACTIONS, to_actions
 from pneumarm.errors import UnusableInput
-from pneumarm.settings import PositiveInt, Settings
+from pneumarm.settings import PositiveInt, PythonOnly, Settings
 from pneumarm.transitions.quantiles import Quantiles
 from pneumarm.transitions.window import Transitions, Window
 
@@ -32,16 +32,16 @@ class GridSettings(Settings):
     """Divisions of each pressure (thesis: 8)."""
     chain_bins: PositiveInt = 5
     """Divisions of angle, velocity and pressures where an arm has several joints (thesis section 6.1.4: 5)."""
-    command_bins: PositiveInt = 3
+    command_bins: Annotated[PositiveInt, PythonOnly] = 3
     """Divisions of each muscle's command where commands are continuous or pulses (not in the thesis); valves are
     divided into the 9 actions of a joint. Three keeps a grid of as many cells: 3 x 3 = 9."""
     per_cell: PositiveInt = 5
     """Transitions kept of a cell at most, on average (thesis: n = 5)."""
-    inside: Annotated[float, Meta(ge=0.5, le=1)] = 0.998
+    inside: Annotated[float, Meta(ge=0.5, le=1), PythonOnly] = 0.998
     """Share of the data that the grid spans in each dimension, leaving out as much at both ends; what lies beyond
     counts to the outermost cells. The thesis does not say what its grid spans. With 1 it spans everything, and one
     spike of the velocity makes its divisions too coarse for all the rest."""
-    most: PositiveInt = 500_000
+    most: Annotated[PositiveInt, PythonOnly] = 500_000
     """Transitions kept at most, on average; over that the probability to be kept is lowered everywhere alike. It
     bounds memory where there are so many dimensions that nearly every transition has a cell of its own."""
 

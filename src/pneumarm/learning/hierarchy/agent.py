@@ -13,7 +13,7 @@ from pneumarm.files import read_arrays, write_arrays
 from pneumarm.learning.agents import SimulationAgent
 from pneumarm.learning.hierarchy.loop import begin_levels, go_on, hierarchy, level_memory, test_levels, upper_shape
 from pneumarm.learning.hierarchy.settings import HierarchySettings
-from pneumarm.learning.online.loop import Schedule
+from pneumarm.learning.online.schedule import Schedule
 from pneumarm.learning.online.values import network_shapes, pack
 from pneumarm.random import random_state
 from pneumarm.simulation.layout import layout_of
@@ -21,6 +21,7 @@ from pneumarm.simulation.simulation import Simulation
 from pneumarm.task.begin import BeginStates
 from pneumarm.task.environment import environment, episode
 from pneumarm.task.movements import NOISE, Movements, movements
+from pneumarm.transitions.goals import Goals
 
 KIND = "pneumarm.learning.hierarchy:HIERARCHY"
 GREEDY = Schedule(np.inf, 0.0, 1.0, 0.0)
@@ -36,6 +37,11 @@ class HierarchicalAgent(SimulationAgent):
     lower: NDArray[np.float32]
     """Weights, see :class:`~pneumarm.learning.online.values.ActionValues`."""
     settings: HierarchySettings
+
+    @property
+    def goals(self) -> Goals:
+        """Goals that it has learned."""
+        return self.settings.goals_in(self.simulation)
 
     def actor(self) -> "HierarchicalActor":
         """Return it acting greedily; it does not learn while it moves an arm."""

@@ -5,8 +5,8 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from pneumarm.learning.online.settings import TrainSettings
-from pneumarm.settings import PositiveInt, Share, Units
+from pneumarm.learning.online.settings import Help, TrainSettings
+from pneumarm.settings import PositiveInt, Share, Units, Valid
 
 UpperState = Literal["angles", "whole"]
 
@@ -27,3 +27,9 @@ class HierarchySettings(TrainSettings):
     """Hidden units of each of its networks, one for each combination of subgoals."""
     upper_state: UpperState = "angles"
     """What it sees: angles and goals alone, or all that the lower agents see."""
+
+    def _valid(self) -> Valid:
+        return {
+            "help": self.help == Help() or "none: a hierarchy has its subgoals",
+            "shaping": not self.shaping or not self.shaping.each or "one deviation for all joints",
+        }

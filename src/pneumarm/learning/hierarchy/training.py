@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from pneumarm.learning.hierarchy.agent import HierarchicalAgent
 from pneumarm.learning.hierarchy.loop import hierarchy, level_memory, train_levels, upper_shape
 from pneumarm.learning.hierarchy.settings import HierarchySettings
-from pneumarm.learning.online.loop import Schedule
+from pneumarm.learning.online.schedule import Schedule
 from pneumarm.learning.online.training import ShapedLearner
 from pneumarm.learning.training import Training, identity_of, train_side_by_side
 from pneumarm.simulation.simulation import Simulation

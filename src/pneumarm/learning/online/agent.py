@@ -19,7 +19,8 @@ from pneumarm.errors import PneumarmError, UnusableInput
 from pneumarm.files import read_arrays, write_arrays
 from pneumarm.kernels import part
 from pneumarm.learning.agents import ReachesGoals
-from pneumarm.learning.online.loop import Schedule, learn, look_ahead, loop_workspace, remember, spread
+from pneumarm.learning.online.loop import learn, look_ahead, loop_workspace, remember, spread
+from pneumarm.learning.online.schedule import Schedule
 from pneumarm.learning.online.settings import Exploration, TrainSettings
 from pneumarm.learning.online.testing import run_test
 from pneumarm.learning.online.values import (

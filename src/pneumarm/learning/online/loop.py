@@ -16,10 +16,19 @@ from numpy.typing import NDArray
 from pneumarm.arm.valves import ACTIONS
 from pneumarm.kernels import borrowed, kernel, part
 from pneumarm.learning.online.exploration import choose, greedy
+from pneumarm.learning.online.schedule import (
+    Retry,
+    begin_training,
+    end_training,
+    farthest,
+    no_retry,
+    note_distances,
+    pay,
+    schedule_here,
+)
 from pneumarm.learning.online.values import ActionValues, action_values, forget_traces, td_target, update
 from pneumarm.task.environment import at_goal, begin_episode, gained, take
 from pneumarm.task.noting import goes_on, note_action, note_begin, note_end
-from pneumarm.task.reward import paid
 
 
 class Workspace(NamedTuple):
@@ -45,6 +54,7 @@ class Workspace(NamedTuple):
     """What each joint was paid for its last action, shape (joints,)."""
     there: NDArray[np.bool_]
     """Whether each joint is at its goal, shape (joints,); of interest only to agents with goals of their own."""
+    retry: Retry
 
 
 def loop_workspace(learner: ActionValues, joints: int) -> Workspace:
@@ -61,20 +71,8 @@ def loop_workspace(learner: ActionValues, joints: int) -> Workspace:
         next_actions=np.full(joints, -1, np.int64),
         paid=np.zeros(joints),
         there=np.zeros(joints, np.bool_),
+        retry=no_retry(joints),
     )
-
-
-class Schedule(NamedTuple):
-    """What shaping decides for the next episodes."""
-
-    deviation: float
-    """[counts]; infinite for all begin states alike."""
-    epsilon: float
-    temperature: float
-    performance_rate: float
-    """Weight of the newest episode in the performance."""
-    enough: float = np.inf
-    """Performance at which training episodes end early, looked at after every one of them."""
 
 
 @part
@@ -140,23 +138,25 @@ def remember(workspace, x):  # type: ignore[no-untyped-def]
 def train_episode(environment, learner, schedule, episode, workspace):  # type: ignore[no-untyped-def]
     """Run one episode, learning; return actions taken, sum of rewards, and whether the goal was reached."""
     x, random, total = episode.state.x, episode.state.random, 0.0
-    begin_episode(environment, episode, schedule.deviation, random)
+    task = environment.task
+    begin_training(environment, episode, schedule, workspace.retry)
     for agent in range(workspace.chosen.shape[0]):
         forget_traces(learner, agent)
-    look_ahead(learner, schedule, x, workspace, random)
-    for k in range(environment.task.cutoff):
+    look_ahead(learner, schedule_here(schedule, task, episode), x, workspace, random)
+    for k in range(task.cutoff):
         remember(workspace, x)
+        note_distances(task, episode, workspace.paid)
         is_reached = take(environment, episode, workspace.next_actions)
         if not is_reached:
-            look_ahead(learner, schedule, x, workspace, random)
-        total += gained(environment.task, episode, is_reached)
+            look_ahead(learner, schedule_here(schedule, task, episode), x, workspace, random)
+        total += gained(task, episode, is_reached)
+        pay(task, schedule, episode, is_reached, workspace.paid)
         for joint in range(episode.goal.shape[0]):
-            workspace.paid[joint] = paid(environment.task.reward, is_reached, episode.switched[joint])
-            workspace.there[joint] = at_goal(environment.task, episode, joint)
+            workspace.there[joint] = at_goal(task, episode, joint)
         learn(learner, workspace, is_reached)
-        if is_reached:
-            return k + 1, total, True
-    return environment.task.cutoff, total, False
+        if is_reached or farthest(task, episode) > schedule.stray:
+            return k + 1, total, is_reached
+    return task.cutoff, total, False
 
 
 @part(entry=True)
@@ -166,6 +166,7 @@ def train_episodes(environment, learner, schedule, episode, workspace, count, pe
     steps = 0
     for e in range(count):
         actions, _, success = train_episode(environment, learner, schedule, episode, workspace)
+        end_training(environment.task, episode, schedule, workspace.retry, success)
         steps += actions
         performance += schedule.performance_rate * ((1.0 if success else 0.0) - performance)
         if performance >= schedule.enough:

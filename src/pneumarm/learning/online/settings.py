@@ -3,10 +3,25 @@
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
+import numpy as np
 from msgspec import Meta
 
-from pneumarm.settings import NonNegativeFloat, PositiveFloat, PositiveInt, PythonOnly, Settings, Share, Units, Valid
+from pneumarm.errors import UnusableInput
+from pneumarm.settings import (
+    NonNegativeFloat,
+    NonNegativeInt,
+    PositiveFloat,
+    PositiveInt,
+    PythonOnly,
+    Settings,
+    Share,
+    Units,
+    Valid,
+)
+from pneumarm.simulation.simulation import Simulation
+from pneumarm.task.reference import counts_of
 from pneumarm.task.settings import TaskSettings
+from pneumarm.transitions.goals import Goals
 
 Method = Literal["sarsa", "q-learning"]
 Team = Literal["common", "own", "one"]
@@ -54,9 +69,34 @@ class Shaping(Settings):
     """Exploration at the initial deviation (thesis: 0.5 and 20)."""
     weights: Annotated[tuple[NonNegativeFloat, ...], Meta(min_length=1)] = (0.4, 0.3, 0.2, 0.1)
     """Weights of the sub-intervals of begin states on each side of the goal, the farthest first (thesis: these)."""
+    sides: Literal["place", "length"] = "place"
+    """Whether a side is drawn by the goal's place in the range of angles (thesis: eq. 4.16), or by its own length, as
+    the deviation leaves it (table 4.1)."""
+    each: bool = False
+    """Whether each joint has a deviation of its own, by how often it is at its goal in the end (section 6.1.3)."""
 
     def _valid(self) -> Valid:
         return {"weights": sum(self.weights) > 0 or "one above 0"}
+
+
+@dataclass(frozen=True)
+class Help(Settings):
+    """What may help in training besides shaping (sections 4.2.2, 4.2.3, 4.3.3); the thesis used none of it."""
+
+    stray: NonNegativeFloat = 0.0
+    """Deviations from its goal at which an episode that strays is cut off, more than 1; 0: never."""
+    local: float = 0.0
+    """Paid to a joint for each degree that an action brings it nearer to its goal, and taken for each farther."""
+    retry: Annotated[float, Meta(ge=0, lt=1)] = 0.0
+    """Probability that after a failure the same goal and begin state are tried again."""
+    by_position: bool = False
+    """Whether it explores within the deviation as at the end of training, and as shaping has it only farther away, in
+    full at twice the deviation; for off-policy methods (section 4.3.3)."""
+    halving: NonNegativeInt = 0
+    """Episodes in which the learning rate falls to a half, as 1/k does; 0: it stays (thesis)."""
+
+    def _valid(self) -> Valid:
+        return {"stray": self.stray == 0 or self.stray > 1 or "0 or more than 1"}
 
 
 @dataclass(frozen=True)
@@ -92,6 +132,29 @@ class TrainSettings(TaskSettings):
     """Exploration at the end of shaping, or all the time without shaping."""
     shaping: Annotated[Shaping | None, PythonOnly] = field(default_factory=Shaping)
     """Shaping, or None: then all begin states from the first episode on."""
+
+    help: Help = field(default_factory=Help)
+    """What may help besides."""
+    goal: tuple[float, ...] = ()
+    """The only goal to learn, an angle a joint [degrees]; by default all goals (thesis 5.4.1 and 6.1.4: one)."""
+
+    def goals_in(self, simulation: Simulation) -> Goals:
+        """Return the goals to learn."""
+        if not self.goal:
+            return simulation.goals
+        if len(self.goal) != simulation.window.joints:
+            raise UnusableInput(f"goal: expected {simulation.window.joints} angle(s) in degrees, got {self.goal}")
+        only = counts_of(self.goal, simulation.spec)
+        low, high = simulation.goal_range.T
+        if not ((low <= only) & (only <= high)).all():
+            within = ", ".join(f"{a:.0f} to {b:.0f}" for a, b in simulation.spec.degrees(simulation.goal_range))
+            raise UnusableInput(f"goal: expected angles within {within} degrees, got {self.goal}")
+        return Goals.of(np.stack([only, only], axis=1))
+
+    @property
+    def by_length(self) -> bool:
+        """Whether sides are drawn by their length, see :class:`Shaping`."""
+        return self.shaping is not None and self.shaping.sides == "length"
 
     @property
     def begin_weights(self) -> tuple[float, ...]:

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pneumarm.arm.seam import ArmSpec
-from pneumarm.learning.online.loop import Schedule
+from pneumarm.learning.online.schedule import Schedule
 from pneumarm.learning.online.settings import TrainSettings
 
 
@@ -44,9 +44,8 @@ def stage(deviation: float, settings: TrainSettings, spec: ArmSpec) -> ShapingSt
     if shaping is None:
         rate, demanded = _NO_SHAPING
         enough = demanded if settings.stops else np.inf
-        return ShapingStage(
-            Schedule(np.inf, float(last.epsilon), float(last.temperature), rate, enough), demanded, True
-        )
+        schedule = Schedule(np.inf, float(last.epsilon), float(last.temperature), rate, enough)
+        return ShapingStage(_helped(schedule, settings, spec), demanded, True)
     low, high = spec.angle_range
     first, whole = initial_deviation(settings, spec), high - low
     share = (deviation - first) / (whole - first) if whole > first else 1.0
@@ -57,8 +56,18 @@ def stage(deviation: float, settings: TrainSettings, spec: ArmSpec) -> ShapingSt
     epsilon = between(shaping.exploration.epsilon, last.epsilon)
     temperature = between(shaping.exploration.temperature, last.temperature)
     criterion = between(shaping.initial_criterion, shaping.criterion)
-    return ShapingStage(
-        Schedule(float(deviation), epsilon, temperature, shaping.performance_rate), criterion, deviation >= whole
+    schedule = Schedule(float(deviation), epsilon, temperature, shaping.performance_rate)
+    return ShapingStage(_helped(schedule, settings, spec), criterion, deviation >= whole)
+
+
+def _helped(schedule: Schedule, settings: TrainSettings, spec: ArmSpec) -> Schedule:
+    """Return ``schedule`` with what the settings have besides shaping."""
+    help_, is_shaped = settings.help, settings.shaping is not None
+    return schedule._replace(
+        near_epsilon=float(settings.exploration.epsilon) if help_.by_position and is_shaped else -1.0,
+        stray=float(help_.stray * schedule.deviation) if help_.stray and is_shaped else np.inf,
+        local=float(help_.local / spec.counts_per_degree),
+        retry=float(help_.retry),
     )
 
 

@@ -4,7 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.errors import UnusableInput
-from pneumarm.learning.online.loop import Schedule, loop_workspace, test_episodes
+from pneumarm.learning.online.loop import loop_workspace, test_episodes
+from pneumarm.learning.online.schedule import Schedule
 from pneumarm.learning.online.settings import Exploration, TrainSettings
 from pneumarm.learning.online.values import learner
 from pneumarm.random import random_state

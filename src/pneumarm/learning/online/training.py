@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.learning.online.agent import Agent
-from pneumarm.learning.online.loop import Schedule, loop_workspace, train_episodes
+from pneumarm.learning.online.loop import loop_workspace, train_episodes
+from pneumarm.learning.online.schedule import Schedule
 from pneumarm.learning.online.settings import TrainSettings
 from pneumarm.learning.online.shaping import adjusted, initial_deviation, stage
 from pneumarm.learning.online.testing import run_test
@@ -89,6 +90,11 @@ class ShapedLearner(Learner[AgentT], Generic[AgentT, SettingsT]):
         """Deviation and performance."""
         self._counts = np.zeros(3, np.int64)
         """Episodes, steps, and whether it met the criterion."""
+        joints = simulation.window.joints
+        self._joints = np.stack([np.full(joints, self._first), np.zeros(joints)])
+        """Deviation and performance of each joint."""
+        shares = np.ones(joints)
+        self._env = env._replace(begin=env.begin._replace(shares=shares))
 
     def _drawn(self, random: np.random.Generator) -> NDArray[np.float32]:
         """Return the weights that learning begins with: those of the thesis' networks."""
@@ -102,6 +108,7 @@ class ShapedLearner(Learner[AgentT], Generic[AgentT, SettingsT]):
             "random": self._random,
             "shaping": self._shaping,
             "counts": self._counts,
+            "joints": self._joints,
         }
 
     @property
@@ -130,6 +137,12 @@ class ShapedLearner(Learner[AgentT], Generic[AgentT, SettingsT]):
         return int(self._counts[0])
 
     @property
+    def rate_share(self) -> float:
+        """The learning rate now, as a share of that at the beginning: 1/(1 + k/halving) after k episodes."""
+        halving = self._settings.help.halving
+        return halving / (halving + self.episodes) if halving else 1.0
+
+    @property
     def steps(self) -> int:
         """Learning steps so far."""
         return int(self._counts[1])
@@ -147,11 +160,16 @@ class ShapedLearner(Learner[AgentT], Generic[AgentT, SettingsT]):
         self._counts[2] |= now.whole and performance >= now.criterion
         row = (self.episodes, deviation, now.criterion, performance, *now.schedule[1:3])
         self._shaping[0] = adjusted(deviation, performance, settings, self._simulation.spec)
+        if settings.shaping and settings.shaping.each:
+            for joint, (own, is_there) in enumerate(self._joints.T):
+                self._joints[0, joint] = adjusted(own, is_there, settings, self._simulation.spec)
+            self._shaping[0] = self._joints[0].max()
         self.add_row(row, spent)
 
     def _learn(self, count: int) -> tuple[Any, float, float]:
         """Learn from ``count`` episodes; return the stage of shaping, the performance and the processor time."""
         now = stage(float(self._shaping[0]), self._settings, self._simulation.spec)
+        self._env.begin.shares[:] = self._joints[0] / self._joints[0].max()
         # What threads write must not lie on a cache line together, or each slows the other down.
         one = apart(episode(self._env, self._random))
         began = time.thread_time()
@@ -170,12 +188,15 @@ class OnlineTrainee(ShapedLearner[Agent, TrainSettings]):
     """The thesis' networks."""
 
     def _run(self, schedule: Schedule, one: Episode, count: int) -> tuple[float, int, int]:
-        worker = apart(learner(self._weights, self._settings))
+        rate = self._settings.learning_rate * self.rate_share
+        worker = apart(learner(self._weights, self._settings, rate))
         remembered = apart(loop_workspace(worker, one.goal.size))
+        remembered.retry.performance[:] = self._joints[1]
         found: tuple[float, int, int] = train_episodes(
             self._env, worker, schedule, one, remembered, count, float(self._shaping[1])
         )
         self._weights[:] = worker.weights
+        self._joints[1] = remembered.retry.performance
         return found
 
     def validate(self, episodes: int) -> Movements:
@@ -189,7 +210,7 @@ class OnlineTrainee(ShapedLearner[Agent, TrainSettings]):
             spec=simulation.spec,
             window=simulation.window,
             scaling=simulation.scaling,
-            goal_range=simulation.goal_range,
+            goal_range=settings.goals_in(simulation).range,
             networks=unpack(self._weights, simulation.window, settings.hidden, settings.team),
             settings=settings,
         )

@@ -29,6 +29,7 @@ from pneumarm.simulation.simulation import Simulation
 from pneumarm.task.begin import BeginStates
 from pneumarm.task.environment import Environment, environment, episode
 from pneumarm.task.movements import NOISE, Movements, movements
+from pneumarm.transitions.goals import Goals
 
 KIND = "pneumarm values"
 SETTINGS: dict[str, type[ValueSettings]] = {
@@ -50,6 +51,11 @@ class ValueAgent(SimulationAgent):
     learned: NDArray[np.float32]
     """All weights, see :mod:`.weights`, shape (n,)."""
     settings: ValueSettings
+
+    @property
+    def goals(self) -> Goals:
+        """Goals that it has learned."""
+        return self.settings.goals_in(self.simulation)
 
     def weights(self) -> NDArray[np.float32]:
         """Return a copy of all weights."""

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from pneumarm.arm.valves import NEVER
 from pneumarm.kernels import kernel, part
+from pneumarm.learning.online.schedule import Retry, no_retry
 from pneumarm.learning.online.values import td_target
 from pneumarm.learning.values.actor_critic import move_actor
 from pneumarm.learning.values.approximators.function import (
@@ -86,6 +87,7 @@ class ValueMemory(NamedTuple):
     """What each was paid, same shape."""
     path: Path
     """The episode so far, for Monte Carlo."""
+    retry: Retry
 
 
 def value_memory(learner: ValueLearner, inputs: int, steps: int) -> ValueMemory:
@@ -104,6 +106,7 @@ def value_memory(learner: ValueLearner, inputs: int, steps: int) -> ValueMemory:
         cut=np.zeros(agents, np.bool_),
         paid=np.zeros(agents),
         path=path(steps if learner.rule == MONTE_CARLO else 0, agents, variables),
+        retry=no_retry(agents),
     )
 
 

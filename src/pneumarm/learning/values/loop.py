@@ -4,10 +4,17 @@ import numpy as np
 
 from pneumarm.kernels import borrowed, kernel
 from pneumarm.learning.online.exploration import greedy
+from pneumarm.learning.online.schedule import (
+    begin_training,
+    end_training,
+    farthest,
+    note_distances,
+    pay,
+    schedule_here,
+)
 from pneumarm.learning.values.learner import begin_learning, decide, end_episode, learn, remember, weigh
 from pneumarm.task.environment import begin_episode, take
 from pneumarm.task.noting import goes_on, note_action, note_begin, note_end
-from pneumarm.task.reward import paid
 
 
 @kernel
@@ -17,24 +24,25 @@ def train_episodes(environment, learner, schedule, episode, memory, count, perfo
     What is long to compile stands here once: an episode begins, and goes on, with a choice.
     """
     environment, learner, episode, memory = borrowed((environment, learner, episode, memory))
-    x, random, steps, episodes = episode.state.x, episode.state.random, 0, 0
+    x, random, steps, episodes, task = episode.state.x, episode.state.random, 0, 0, environment.task
     for _ in range(count):
-        begin_episode(environment, episode, schedule.deviation, random)
+        begin_training(environment, episode, schedule, memory.retry)
         memory.next_actions[:] = -1
         begin_learning(learner, memory)
         is_reached, taken = False, 0
         while True:
             if not is_reached:
-                decide(learner, schedule, x, memory, random)
+                decide(learner, schedule_here(schedule, task, episode), x, memory, random)
             if taken > 0:
                 learn(learner, schedule, memory, is_reached)
-            if is_reached or taken == environment.task.cutoff:
+            if is_reached or taken == task.cutoff or farthest(task, episode) > schedule.stray:
                 break
             remember(memory, x)
+            note_distances(task, episode, memory.paid)
             is_reached = take(environment, episode, memory.next_actions)
-            for joint in range(episode.goal.shape[0]):
-                memory.paid[joint] = paid(environment.task.reward, is_reached, episode.switched[joint])
+            pay(task, schedule, episode, is_reached, memory.paid)
             taken += 1
+        end_training(task, episode, schedule, memory.retry, is_reached)
         steps, episodes = steps + taken, episodes + 1
         performance += schedule.performance_rate * ((1.0 if is_reached else 0.0) - performance)
         if performance >= schedule.enough:

@@ -1,16 +1,14 @@
 """Training: episodes with the thesis' shaping (section 4.3.2), or rounds of dynamic programming."""
 
 import time
-from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.learning.online.loop import Schedule
+from pneumarm.learning.online.schedule import Schedule
 from pneumarm.learning.online.training import ShapedLearner, apart
-from pneumarm.learning.training import Learner, Progress, Training, identity_of, train_side_by_side
+from pneumarm.learning.training import Learner, Training, identity_of, train_side_by_side
 from pneumarm.learning.values.agent import ValueAgent, run_test
 from pneumarm.learning.values.dynamic_programming import PlanSettings, note_states, part_of, sweep, transitions
 from pneumarm.learning.values.learner import value_memory
@@ -28,16 +26,9 @@ _MOST_SWEEPS = 1000
 
 
 def train_values(
-    simulation: Simulation,
-    begin_states: BeginStates,
-    settings: ValueSettings,
-    seed: int = 0,
-    *,
-    progress: Callable[[Progress], None] | None = None,
-    checkpoint: Path | None = None,
-    threads: int | None = None,
+    simulation: Simulation, begin_states: BeginStates, settings: ValueSettings, seed: int = 0, **how: Any
 ) -> Training[ValueAgent]:
-    """Train agents and return the best, see :func:`~pneumarm.learning.training.train_side_by_side`.
+    """Train agents and return the best; ``how`` as of :func:`~pneumarm.learning.training.train_side_by_side`.
 
     Training of one ends as that of the thesis' agents does, see :func:`~.online.training.train_online`.
     """
@@ -49,13 +40,7 @@ def train_values(
         return ValueTrainee(env, simulation, settings, seed, number)
 
     return train_side_by_side(
-        make,
-        settings.agents,
-        settings.validation_episodes,
-        identity_of(env, settings, seed),
-        progress=progress,
-        checkpoint=checkpoint,
-        threads=threads,
+        make, settings.agents, settings.validation_episodes, identity_of(env, settings, seed), **how
     )
 
 
@@ -85,11 +70,14 @@ class ValueTrainee(Tested, ShapedLearner[ValueAgent, ValueSettings]):
         return first_weights(self._simulation, self._settings, random)
 
     def _run(self, schedule: Schedule, one: Episode, count: int) -> tuple[float, int, int]:
-        learner = learner_of(self._simulation, self._settings, self._weights)
+        rate = self._settings.learning_rate * self.rate_share
+        learner = learner_of(self._simulation, self._settings, self._weights, rate)
         memory = apart(value_memory(learner, one.state.x.size, self._settings.cutoff))
+        memory.retry.performance[:] = self._joints[1]
         found: tuple[float, int, int] = train_episodes(
             self._env, learner, schedule, one, memory, count, float(self._shaping[1])
         )
+        self._joints[1] = memory.retry.performance
         return found
 
 

@@ -47,15 +47,19 @@ def activate(function, agent, z):  # type: ignore[no-untyped-def]
 
 
 @part
+def place_of(function, output):  # type: ignore[no-untyped-def]
+    """Return the row of output weights of an ``output``, and the first of its hidden units."""
+    if function.groups > 1:
+        return function.inputs, output * function.width
+    return function.inputs + output, 0
+
+
+@part
 def network_value(function, agent, output):  # type: ignore[no-untyped-def]
     """Return an ``output`` of what :func:`activate` set."""
-    weights, width, first, row = function.weights[agent], function.width, 0, function.inputs
-    if function.groups > 1:
-        first = output * width
-    else:
-        row += output
+    weights, (row, first) = function.weights[agent], place_of(function, output)
     total = np.float32(0.0)
-    for h in range(first, first + width):
+    for h in range(first, first + function.width):
         total += weights[row, h] * function.hidden[h]
     return total
 
@@ -64,11 +68,7 @@ def network_value(function, agent, output):  # type: ignore[no-untyped-def]
 def add_network_gradient(function, agent, z, output, factor):  # type: ignore[no-untyped-def]
     """Add ``factor`` times the gradient of an ``output`` in ``z`` (inputs,) to the traces of ``agent``."""
     weights, traces, hidden = function.weights[agent], function.traces[agent], function.hidden
-    width, first, row, slope = function.width, 0, function.inputs, function.slope
-    if function.groups > 1:
-        first = output * width
-    else:
-        row += output
+    width, slope, (row, first) = function.width, function.slope, place_of(function, output)
     for h in range(width):
         u = first + h
         slope[h] = factor * weights[row, u] * (np.float32(1.0) - hidden[u] * hidden[u])

@@ -12,7 +12,14 @@ from pneumarm.learning.online.schedule import Schedule
 from pneumarm.learning.values.approximators.coding import Coding
 from pneumarm.learning.values.approximators.function import ValueFunction, value_function
 from pneumarm.learning.values.approximators.table import table
-from pneumarm.learning.values.learner import ACTOR_CRITIC, TD, ValueLearner, begin_acting, learn_and_act, value_memory
+from pneumarm.learning.values.learner import (
+    ACTOR_CRITIC,
+    TD,
+    LearnedValues,
+    begin_acting,
+    learn_and_act,
+    value_memory,
+)
 from pneumarm.learning.values.policies import POLICIES, PolicyName
 from pneumarm.learning.values.td import model_of
 from pneumarm.learning.values.view import whole_view
@@ -118,7 +125,7 @@ class Student:
             actor = coding, np.zeros((1, problem.actions, coding.size), np.float32)
         self.inputs = len(problem.seen(problem.begin))
         self.values = value_function(coding, weights, visits, is_replacing=is_replacing, **network)
-        self.learner = ValueLearner(
+        self.learner = LearnedValues(
             rule=rule,
             policy=POLICIES.index(policy),
             values=self.values,

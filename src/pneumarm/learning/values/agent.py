@@ -14,8 +14,8 @@ from pneumarm.files import read_arrays, write_arrays
 from pneumarm.learning.agents import SimulationAgent
 from pneumarm.learning.online.agent import OnlineLearner
 from pneumarm.learning.values.actor_critic import ActorCriticSettings
-from pneumarm.learning.values.dynamic_programming import PlanSettings
-from pneumarm.learning.values.learner import ValueLearner, begin_acting, learn_and_act, value_memory, weigh
+from pneumarm.learning.values.dynamic_programming import IterationSettings
+from pneumarm.learning.values.learner import LearnedValues, begin_acting, learn_and_act, value_memory, weigh
 from pneumarm.learning.values.loop import test_episodes
 from pneumarm.learning.values.monte_carlo import MonteCarloSettings
 from pneumarm.learning.values.policies import GREEDY
@@ -38,7 +38,7 @@ SETTINGS: dict[str, type[ValueSettings]] = {
     "sarsa-lambda": SarsaSettings,
     "q-lambda": QSettings,
     "actor-critic": ActorCriticSettings,
-    "dynamic-programming": PlanSettings,
+    "dynamic-programming": IterationSettings,
 }
 """Settings by rule."""
 _WEIGHTS = "learned"
@@ -112,7 +112,7 @@ class ValueAgent(SimulationAgent):
         return cls(simulation, learned, settings)
 
 
-def run_test(env: Environment, learner: ValueLearner, episodes: int, seed: tuple[int, ...]) -> Movements:
+def run_test(env: Environment, learner: LearnedValues, episodes: int, seed: tuple[int, ...]) -> Movements:
     """Test ``learner`` in ``env``, greedily; begin states and goals are drawn by ``seed``, and so is the noise."""
     if episodes < 1:
         raise UnusableInput(f"a test needs at least one episode, got {episodes}")

@@ -33,7 +33,7 @@ _HELD = 0.8  # share of the random actions that are the one before: others cance
 
 
 @dataclass(frozen=True)
-class PlanSettings(ValueSettings):
+class IterationSettings(ValueSettings):
     """Dynamic programming."""
 
     rule: Annotated[Literal["dynamic-programming"], PythonOnly] = "dynamic-programming"
@@ -52,7 +52,7 @@ class PlanSettings(ValueSettings):
     """Largest change of a value with which a round ends, in units of reward."""
 
 
-class Transitions(NamedTuple):
+class NotedSteps(NamedTuple):
     """What each action led to in each of ``n`` states. Made by :func:`transitions`."""
 
     cell: NDArray[np.int64]
@@ -63,20 +63,20 @@ class Transitions(NamedTuple):
     """Shape (n, choices), without what a switch is paid."""
 
 
-def part_of(noted: Transitions, first: int, last: int) -> Transitions:
+def part_of(noted: NotedSteps, first: int, last: int) -> NotedSteps:
     """Return the states from ``first`` to before ``last``, sharing their memory."""
-    return Transitions(noted.cell[first:last], noted.next_cell[first:last], noted.reward[first:last])
+    return NotedSteps(noted.cell[first:last], noted.next_cell[first:last], noted.reward[first:last])
 
 
-def transitions(states: int, choices: int) -> Transitions:
+def transitions(states: int, choices: int) -> NotedSteps:
     """Return room for so many states."""
     each = states, choices
-    return Transitions(np.zeros(states, np.int64), np.zeros(each, np.int64), np.zeros(each))
+    return NotedSteps(np.zeros(states, np.int64), np.zeros(each, np.int64), np.zeros(each))
 
 
 @kernel
 def sweep(noted, discount, switch, values, workspace):  # type: ignore[no-untyped-def]
-    """Update all ``values`` (choices, cells) by :class:`Transitions`; return the largest change.
+    """Update all ``values`` (choices, cells) by :class:`NotedSteps`; return the largest change.
 
     The value of a cell that was never noted stays as it is. ``workspace`` has the shape (3, choices, cells).
     """

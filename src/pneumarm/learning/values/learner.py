@@ -29,13 +29,13 @@ from pneumarm.learning.values.monte_carlo import Path, learn_path, note_step, pa
 from pneumarm.learning.values.policies import act_by, boltzmann
 from pneumarm.learning.values.q_lambda import look_ahead_q
 from pneumarm.learning.values.sarsa import look_ahead_sarsa
-from pneumarm.learning.values.td import Model, foresee_values, row_of
-from pneumarm.learning.values.view import View, see
+from pneumarm.learning.values.td import Foreseen, foresee_values, row_of
+from pneumarm.learning.values.view import Seen, see
 
 TD, MONTE_CARLO, SARSA, Q_LEARNING, ACTOR_CRITIC = range(5)
 
 
-class ValueLearner(NamedTuple):
+class LearnedValues(NamedTuple):
     """Values, and how they are learned."""
 
     rule: int
@@ -46,9 +46,9 @@ class ValueLearner(NamedTuple):
     """Of actions; for TD and a critic of states."""
     actor: ValueFunction
     """Preferences of an actor."""
-    variables: View
+    variables: Seen
     """What each agent sees."""
-    model: Model
+    model: Foreseen
     possible: NDArray[np.bool_]
     """Actions that a joint has, shape (choices,)."""
     rate: float
@@ -90,7 +90,7 @@ class ValueMemory(NamedTuple):
     retry: Retry
 
 
-def value_memory(learner: ValueLearner, inputs: int, steps: int) -> ValueMemory:
+def value_memory(learner: LearnedValues, inputs: int, steps: int) -> ValueMemory:
     """Return workspace for states of so many ``inputs`` and episodes of so many ``steps``."""
     agents, choices = len(learner.values.weights), len(learner.possible)
     variables = learner.variables.place.shape[1] or inputs

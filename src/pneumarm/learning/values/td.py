@@ -45,7 +45,7 @@ class TdSettings(ValueSettings):
     """lambda of the eligibility traces (thesis: 0)."""
 
 
-class Model(NamedTuple):
+class Foreseen(NamedTuple):
     """The arm as it is foreseen. Made by :func:`model_of`."""
 
     environment: Environment
@@ -55,14 +55,14 @@ class Model(NamedTuple):
     """Workspace, shape (joints,)."""
 
 
-def model_of(simulation: Simulation, settings: TaskSettings) -> Model:
+def model_of(simulation: Simulation, settings: TaskSettings) -> Foreseen:
     """Return ``simulation`` without noise as a model of the arm."""
     window = simulation.window
     none = BeginStates(window, np.zeros((0, window.state_size), np.float32), np.zeros((0, window.joints)))
     quiet = environment(simulation, none, settings)._replace(
         noise=noise_parameters(NoiseSettings(kind="none"), simulation)
     )
-    return Model(quiet, episode(quiet, random_state(0)), np.zeros(window.joints, np.int64))
+    return Foreseen(quiet, episode(quiet, random_state(0)), np.zeros(window.joints, np.int64))
 
 
 @part

@@ -10,7 +10,7 @@ from pneumarm.learning.online.schedule import Schedule
 from pneumarm.learning.online.training import ShapedLearner, apart
 from pneumarm.learning.training import Learner, Training, identity_of, train_side_by_side
 from pneumarm.learning.values.agent import ValueAgent, run_test
-from pneumarm.learning.values.dynamic_programming import PlanSettings, note_states, part_of, sweep, transitions
+from pneumarm.learning.values.dynamic_programming import IterationSettings, note_states, part_of, sweep, transitions
 from pneumarm.learning.values.learner import value_memory
 from pneumarm.learning.values.loop import train_episodes
 from pneumarm.learning.values.settings import ValueSettings
@@ -35,8 +35,8 @@ def train_values(
     env = environment(simulation, begin_states, settings)
 
     def make(number: int) -> Learner[ValueAgent]:
-        if isinstance(settings, PlanSettings):
-            return Planner(env, simulation, settings, seed)
+        if isinstance(settings, IterationSettings):
+            return ValueIteration(env, simulation, settings, seed)
         return ValueTrainee(env, simulation, settings, seed, number)
 
     return train_side_by_side(
@@ -81,12 +81,12 @@ class ValueTrainee(Tested, ShapedLearner[ValueAgent, ValueSettings]):
         return found
 
 
-class Planner(Tested, Learner[ValueAgent]):
+class ValueIteration(Tested, Learner[ValueAgent]):
     """Dynamic programming, round after round."""
 
     columns = ("episodes", "states", "cells", "sweeps", "change")
 
-    def __init__(self, env: Environment, simulation: Simulation, settings: PlanSettings, seed: int) -> None:
+    def __init__(self, env: Environment, simulation: Simulation, settings: IterationSettings, seed: int) -> None:
         super().__init__()
         self._env, self._simulation, self._settings, self._seed = env, simulation, settings, seed
         self._weights = first_weights(simulation, settings, np.random.default_rng(0))

@@ -19,7 +19,7 @@ _NEAR = {"error": 4.0, "velocity": 2.0}
 """c, in tolerances of the goal."""
 
 
-class View(NamedTuple):
+class Seen(NamedTuple):
     """Where the variables are in a state vector ``x`` and what they are scaled by. Made by :func:`view_of`."""
 
     place: NDArray[np.int64]
@@ -34,13 +34,13 @@ class View(NamedTuple):
     """Shape (variables,)."""
 
 
-def whole_view(agents: int) -> View:
+def whole_view(agents: int) -> Seen:
     """Return the view of all of the state, unscaled."""
     none = np.zeros((agents, 0), np.int64)
-    return View(none, none, np.zeros((agents, 0)), np.zeros((agents, 0)), np.zeros(0, np.bool_))
+    return Seen(none, none, np.zeros((agents, 0)), np.zeros((agents, 0)), np.zeros(0, np.bool_))
 
 
-def view_of(simulation: Simulation, settings: ValueSettings) -> View:
+def view_of(simulation: Simulation, settings: ValueSettings) -> Seen:
     """Return what each joint's agent sees in ``simulation``."""
     window, scaling, layout = simulation.window, simulation.scaling, layout_of(simulation.window)
     if settings.approximator in {"network", "networks"}:
@@ -66,7 +66,7 @@ def view_of(simulation: Simulation, settings: ValueSettings) -> View:
                 range_[joint, i] = high - low[joint, i]
             if name in near:
                 range_[joint, i] = _NEAR[name] * near[name] / unit
-    return View(place, minus, low, range_, np.array([name in near for name in settings.variables]))
+    return Seen(place, minus, low, range_, np.array([name in near for name in settings.variables]))
 
 
 @kernel

@@ -13,7 +13,7 @@ from pneumarm.learning.values.approximators.network import draw_weights, network
 from pneumarm.learning.values.approximators.radial import radial
 from pneumarm.learning.values.approximators.table import table
 from pneumarm.learning.values.approximators.tiles import tiles
-from pneumarm.learning.values.learner import ACTOR_CRITIC, MONTE_CARLO, Q_LEARNING, SARSA, TD, ValueLearner
+from pneumarm.learning.values.learner import ACTOR_CRITIC, MONTE_CARLO, Q_LEARNING, SARSA, TD, LearnedValues
 from pneumarm.learning.values.policies import POLICIES
 from pneumarm.learning.values.settings import Rule, ValueSettings
 from pneumarm.learning.values.td import model_of
@@ -93,7 +93,7 @@ def learner_of(
     settings: ValueSettings,
     weights: NDArray[np.float32],
     learning_rate: float | None = None,
-) -> ValueLearner:
+) -> LearnedValues:
     """Return a learner that changes ``weights`` (n,) in place."""
     parts, begin = {}, 0
     for name, shape in weight_shapes(simulation, settings).items():
@@ -116,7 +116,7 @@ def learner_of(
 
     rate = settings.learning_rate if learning_rate is None else learning_rate
     share = rate / settings.learning_rate if settings.learning_rate else 1.0
-    return ValueLearner(
+    return LearnedValues(
         rule=RULES[settings.rule],
         policy=POLICIES.index(settings.policy),
         values=function("values", 1 if settings.rule in {"td", "actor-critic"} else ACTIONS),

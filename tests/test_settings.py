@@ -13,7 +13,7 @@ from msgspec import Meta
 from pneumarm.arm import ArmSpec
 from pneumarm.errors import UnusableInput
 from pneumarm.run import RunSettings
-from pneumarm.settings import Layers, PositiveFloat, PositiveInt, Settings, Share, Valid
+from pneumarm.settings import Layers, PositiveFloat, PositiveInt, Settings, Share, Valid, in_words
 
 
 def defaults(kind: type) -> Iterator[tuple[str, Any, Any]]:
@@ -134,3 +134,9 @@ def test_no_class_of_settings_can_forget_its_parent() -> None:
         class Forgetful(Parent):
             def __post_init__(self) -> None:
                 pass
+
+
+def test_the_values_that_a_field_lists_are_named() -> None:
+    with pytest.raises(msgspec.ValidationError) as refused:
+        msgspec.convert({"kind": "square"}, Child)
+    assert in_words(refused.value, Child) == "straight, bent, round, at kind"

@@ -109,11 +109,17 @@ _SAID = re.compile(
     r"Expected `(?P<kind>\w+)(?: \| null)?`(?: (?:of length )?(?P<sign>[<>]=?)? ?(?P<bound>[-+.\de]+))?"
     r"(?:, got [^$]+?)?(?: - at `\$(?P<place>.+)`)?"
 )
+_LISTED = re.compile(r"Invalid enum value .* - at `\$\.(\w+)`")
 
 
-def in_words(error: msgspec.ValidationError) -> str:
-    """Return what was expected as ``error`` says it, in words: "a whole number, 1 or more"."""
-    found = _SAID.fullmatch(str(error))
+def in_words(error: msgspec.ValidationError, settings: type | None = None) -> str:
+    """Return what was expected as ``error`` says it, in words: "a whole number, 1 or more".
+
+    Of a field of ``settings`` that lists its values, which msgspec does not name, return these.
+    """
+    found, listed = _SAID.fullmatch(str(error)), _LISTED.fullmatch(str(error))
+    if listed is not None and settings is not None:
+        return f"{', '.join(_choices(get_type_hints(settings)[listed[1]]))}, at {listed[1]}"
     if found is None:
         return str(error).removeprefix("Expected ")
     kind, sign, bound, place = found.groups()

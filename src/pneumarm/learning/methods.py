@@ -213,7 +213,7 @@ class LearnSettings(Settings):
             found = msgspec.convert({**own, **method.fixed}, method.settings, strict=False)
             return replace(found)  # msgspec leaves defaults in the class, where vars() does not see them
         except msgspec.ValidationError as error:
-            raise UnusableInput(f"method {self.method}: expected {in_words(error)}") from error
+            raise UnusableInput(f"method {self.method}: expected {in_words(error, method.settings)}") from error
         except msgspec.DecodeError as error:
             raise UnusableInput(f"method {self.method}: expected JSON after [ or {{; {error}") from error
 

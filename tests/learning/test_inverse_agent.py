@@ -14,6 +14,7 @@ from pneumarm.learning.inverse.agent import InverseActor, InverseAgent
 from pneumarm.learning.inverse.cloud import InverseSettings
 from pneumarm.transitions import Store
 
+pytest.importorskip("scipy.spatial")
 SMALL = InverseSettings(depth=20, width=300)
 
 

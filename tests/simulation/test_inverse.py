@@ -1,13 +1,17 @@
 """The inverse simulation (thesis eq. 4.17): turned round transitions, steps back, and which actions are possible."""
 
+import sys
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from pneumarm.arm import ArmSpec
-from pneumarm.simulation.inverse import InverseSimulation, fit_inverse, turned_round
+from pneumarm.errors import UnusableInput
+from pneumarm.simulation.inverse import InverseSimulation, fit_inverse, nearest, turned_round
 from pneumarm.transitions import Transitions
 
+pytest.importorskip("scipy.spatial")
 GAIN = 0.2
 """Share of what a valve's pressure is still away from, that a period brings."""
 
@@ -67,3 +71,9 @@ def test_a_full_muscle_cannot_just_have_let_air_out(inverse: InverseSimulation) 
 
 def test_a_command_that_was_never_recorded_is_not_possible(inverse: InverseSimulation) -> None:
     assert not inverse.is_possible(np.array([[510.0, 0.0, 90.0, 90.0]]), np.array([0.5, 0.0])).any()
+
+
+def test_without_its_library_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "scipy.spatial", None)
+    with pytest.raises(UnusableInput, match=r"the inverse simulation needs scipy: pip install 'pneumarm\[inverse\]'"):
+        nearest(np.zeros((2, 2)))

@@ -53,7 +53,8 @@ def test_the_terminal_says_how_the_arm_moves(run, capsys):
     _, results = run
     show(results, False, lambda: list(how_it_moves(results)))
     said, settled = capsys.readouterr().out, results["settle"]
-    assert f"{round(settled['settled'] * settled['movements'])} of {settled['movements']} goals" in said
+    assert f"of {settled['movements']} goals" in said
+    assert f"{100 * settled['settled']:.4g} %" in said
     assert f"{settled['median_seconds']:.2f} s" in said
     for one in results["track"]:
         assert f"{one['rms_error_deg'][0]:.2f}°" in said

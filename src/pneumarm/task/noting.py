@@ -1,7 +1,8 @@
 """Parts of compiled loops that write movements into their record, action by action."""
 
-from pneumarm.kernels import part
+from pneumarm.kernels import inner, part
 from pneumarm.task.environment import angle, velocity
+from pneumarm.task.fleet import one
 from pneumarm.task.reward import paid
 
 
@@ -37,3 +38,21 @@ def note_end(task, episode, is_reached, record, e):  # type: ignore[no-untyped-d
 def goes_on(task, is_reached, record, e):  # type: ignore[no-untyped-def]
     """Return whether movement ``e`` goes on: its goal is not reached and it is not cut off."""
     return not is_reached and record.actions[e] < task.cutoff
+
+
+@inner
+def note_alive(task, fleet, alive, is_reached, record, first):  # type: ignore[no-untyped-def]
+    """Note what each arm of ``fleet`` that is ``alive`` (n,) did, as movement ``first`` + e; return how many ended.
+
+    Those whose movement ended, which ``is_reached`` (n,) and the cut-off decide, are no longer alive.
+    """
+    ended = 0
+    for e in range(alive.shape[0]):
+        if not alive[e]:
+            continue
+        note_action(task.reward, fleet.switched[e], is_reached[e], record, first + e)
+        if not goes_on(task, is_reached[e], record, first + e):
+            note_end(task, one(fleet, e), is_reached[e], record, first + e)
+            alive[e] = False
+            ended += 1
+    return ended

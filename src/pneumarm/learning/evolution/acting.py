@@ -15,7 +15,7 @@ from pneumarm.simulation.simulation import Simulation
 from pneumarm.task.begin import BeginStates
 from pneumarm.task.environment import GOES_ON, Environment, begin_episode, ending, environment
 from pneumarm.task.fleet import Fleet, Limits, begin_one, fleet, gained_by, limits, one, take_alive
-from pneumarm.task.noting import goes_on, note_action, note_begin, note_end
+from pneumarm.task.noting import note_alive, note_begin
 from pneumarm.transitions.window import Window
 
 _OPEN = np.float32(1 / 3)  # output beyond which a valve is open: inlet, closed and outlet get a third each
@@ -193,14 +193,7 @@ def move_together(world, network, arms, record, first, count):  # type: ignore[n
     while left > 0:
         choose_valves(world, network, arms, 0)
         take_alive(world.environment, world.limits, fleet, arms.actions, arms.alive, arms.is_reached)
-        for e in range(count):
-            if not arms.alive[e]:
-                continue
-            note_action(task.reward, fleet.switched[e], arms.is_reached[e], record, first + e)
-            if not goes_on(task, arms.is_reached[e], record, first + e):
-                arms.alive[e] = False
-                left -= 1
-                note_end(task, one(fleet, e), arms.is_reached[e], record, first + e)
+        left -= note_alive(task, fleet, arms.alive, arms.is_reached, record, first)
 
 
 @kernel

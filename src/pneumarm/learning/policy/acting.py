@@ -21,8 +21,8 @@ from pneumarm.networks.layers import Layers, forward, workspace
 from pneumarm.random import RandomState
 from pneumarm.simulation.noise import begin_noise
 from pneumarm.task.environment import Environment
-from pneumarm.task.fleet import Fleet, Limits, fleet, gained_by, one, take_alive, take_all
-from pneumarm.task.noting import goes_on, note_action, note_end
+from pneumarm.task.fleet import Fleet, Limits, fleet, gained_by, take_alive, take_all
+from pneumarm.task.noting import note_alive
 
 
 class Mind(NamedTuple):
@@ -102,19 +102,12 @@ def judge_all(mind, lanes):  # type: ignore[no-untyped-def]
 def run_lanes(mind, lanes, record, first, count):  # type: ignore[no-untyped-def]
     """Let the policy move in ``count`` lanes that have begun, and write entries from ``first`` on into ``record``."""
     task, arms, left = mind.environment.task, lanes.fleet, count
-    for e in range(count):
-        lanes.alive[e] = True
+    for e in range(lanes.alive.shape[0]):
+        lanes.alive[e] = e < count
     while left > 0:
         judge_all(mind, lanes)
         take_all(mind.environment, mind.limits, arms, lanes.actions, lanes.is_reached)
-        for e in range(count):
-            if not lanes.alive[e]:
-                continue
-            note_action(task.reward, arms.switched[e], lanes.is_reached[e], record, first + e)
-            if not goes_on(task, lanes.is_reached[e], record, first + e):
-                lanes.alive[e] = False
-                left -= 1
-                note_end(task, one(arms, e), lanes.is_reached[e], record, first + e)
+        left -= note_alive(task, arms, lanes.alive, lanes.is_reached, record, first)
 
 
 @inner

@@ -34,6 +34,13 @@ class ArmFailure(PneumarmError):  # noqa: N818
     """The arm stopped answering or answered nonsense while it was in use."""
 
 
+class LineLost(ArmFailure):
+    """The line to the arm was silent, or the arm was vented because it heard nothing; nobody has to look at it.
+
+    Who moves an arm goes on afterwards, see :meth:`pneumarm.arm.guard.GuardedArm.despite_losses`.
+    """
+
+
 class ControllerFailure(PneumarmError):  # noqa: N818
     """A controller went on giving decisions that cannot be used; the arm is vented."""
 

@@ -1,6 +1,7 @@
 """What the stages of a run leave for its report."""
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -98,11 +99,23 @@ def demonstrate(agent: AnyAgent, arm: Arm, seed: int) -> list[Demonstration]:
         half = degrees * arm.spec.counts_per_degree / 2
         middle = (low + high) / 2
         if (half < (high - low) / 2).all():
-            BEGIN.reach(cycle.arm, random)
-            _move(agent, cycle, goals.within(middle - half))
-            cycle.arm.wait(_TAIL)
-            shown.append(_recorded(agent, cycle, goals.within(middle + half), name))
+            ends = (goals.within(middle - half), goals.within(middle + half))
+            shown.append(cycle.arm.despite_losses(partial(_demonstrate, agent, cycle, random, *ends, name)))
     return shown
+
+
+def _demonstrate(
+    agent: AnyAgent,
+    cycle: ControlCycle,
+    random: np.random.Generator,
+    begin: NDArray[np.float64],
+    end: NDArray[np.float64],
+    name: str,
+) -> Demonstration:
+    BEGIN.reach(cycle.arm, random)
+    _move(agent, cycle, begin)
+    cycle.arm.wait(_TAIL)
+    return _recorded(agent, cycle, end, name)
 
 
 def _move(agent: AnyAgent, cycle: ControlCycle, goal: NDArray[np.float64]) -> Movement:

@@ -19,7 +19,7 @@ from pneumarm.arm.serial.protocol import OLDEST_VERSION
 from pneumarm.arm.virtual import VirtualArm, draw_parameters, usual_sensors
 from pneumarm.arm.virtual.further import THERMOMETER
 from pneumarm.control import Monitor, TransferSettings, transfer
-from pneumarm.errors import ArmFailure
+from pneumarm.errors import ArmFailure, LineLost
 from pneumarm.learning import Agent
 from pneumarm.task.movements import join_movements
 from pneumarm.transitions import CollectBegin, CollectSettings, Store, collect
@@ -239,6 +239,42 @@ def test_board_that_is_unplugged_and_plugged_in_again(arm: SerialArm) -> None:
     assert board.time - begun < 2
     arm.set_valves(every(1))
     assert board.chip.valve_pins != 0
+
+
+@pytest.mark.parametrize("meanwhile", ["nothing", "POWER_ON", "EXTERNAL", "WATCHDOG", "BROWN_OUT"])
+def test_what_is_done_with_the_arm_goes_on_after_a_plug_was_out(arm: SerialArm, meanwhile: str) -> None:
+    """On the real firmware, whose count of restarts is in its EEPROM; one that restarted by itself is not armed."""
+    guard, attempts = guarded(arm), []
+    board = in_motion(arm)
+    arm.link.line = gone = FaultyLine(arm._line)
+    arm._line = gone
+
+    def work() -> None:
+        attempts.append(board.time)
+        guard.make_ready()
+        guard.set_valves(every(1))
+        if len(attempts) == 1:
+            gone.unplugged = True
+            with pytest.raises(LineLost):
+                guard.read()
+            board.wait(0.251)
+            assert board.chip.valve_pins == 0
+            if meanwhile == "WATCHDOG":
+                board.chip.hang()
+                board.wait(0.2)
+            elif meanwhile != "nothing":
+                board.reset(meanwhile)
+            gone.unplugged = False
+        guard.wait(0.4)
+
+    if meanwhile in ("WATCHDOG", "BROWN_OUT"):
+        with pytest.raises(ArmFailure, match="restarted by itself"):
+            guard.despite_losses(work)
+        assert board.chip.valve_pins == 0
+    else:
+        guard.despite_losses(work)
+        assert len(attempts) == 2
+        assert board.chip.valve_pins != 0
 
 
 def pulses_at_the_pins(board: SimulatedBoard, since: int, muscle: int) -> list[float]:

@@ -138,6 +138,13 @@ class EstimatedArm(ArmWrapper):
         if self._estimate.time is not None:
             self._estimate.pass_until(self._estimate.time + seconds)
 
+    def regain(self) -> None:
+        """Take up the arm again, which was vented meanwhile."""
+        self.arm.regain()
+        self._estimate.command(np.full((self.spec.joints, 2), -1.0))
+        self.read()
+        self._estimate.command(np.zeros((self.spec.joints, 2)))
+
     def close(self) -> None:
         """Close the arm, and its valves with it."""
         self.arm.close()

@@ -26,9 +26,10 @@ by the :class:`~pneumarm.arm.watchdog.Watchdog`): it holds, then vents, and in t
 import atexit
 import math
 import weakref
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import astuple, dataclass, replace
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -39,7 +40,7 @@ from pneumarm.arm.seam import Arm, Reading, checked
 from pneumarm.arm.valves import Command
 from pneumarm.arm.watchdog import Watchdog
 from pneumarm.arm.wrapper import ArmWrapper
-from pneumarm.errors import ArmFailure, ControllerFailure, PneumarmError, UnusableInput
+from pneumarm.errors import ArmFailure, ControllerFailure, LineLost, PneumarmError, UnusableInput
 
 _SETTINGS = frozenset((-1, 0, 1))
 HELD = 0.1
@@ -52,6 +53,7 @@ VENTING = 10.0
 """How many times faster a muscle recovers from inflation by venting than by resting."""
 
 Reason = Literal["nonsense", "raised", "late"]
+Result = TypeVar("Result")
 
 _open_arms: "weakref.WeakValueDictionary[int, Arm]" = weakref.WeakValueDictionary()
 
@@ -453,6 +455,32 @@ class GuardedArm(Arm):
     def make_ready(self) -> None:
         """Prepare to move after a pause."""
         self.arm.make_ready()
+
+    def regain(self) -> None:
+        """Take up the arm again after its line was lost."""
+        self.arm.regain()
+        self._closing, self._times_pulses = {}, False
+        self._note(np.zeros_like(self._valves))
+        self.applied = self._valves
+
+    def despite_losses(self, work: Callable[[], Result]) -> Result:
+        """Return what ``work`` returns; where the line to the arm is lost in it, it is done again from its beginning.
+
+        ``work`` is a movement or a measurement that does not depend on where the arm was, or that brings it there
+        itself: the arm is vented while nobody is heard.
+
+        Raises:
+            ArmFailure: anything else is wrong with the arm, or the line is lost too often, or for too long.
+
+        """
+        lost = False
+        while True:
+            try:
+                if lost:
+                    self.regain()
+                return work()
+            except LineLost:
+                lost = True
 
     def link_counts(self) -> dict[str, int]:
         """Return what has happened on the link to the arm behind."""

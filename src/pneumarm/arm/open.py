@@ -21,11 +21,11 @@ _FORMS = (
     "virtual, virtual:seed=7, virtual:wide,seed=7, virtual:preset=A, virtual:seed=7,rate=200, "
     "virtual:joints=2,seed=7,coupling=0.5, virtual:seed=7,sensors=velocity+temperature, "
     "virtual:seed=7,pressure_sensors=off, virtual:seed=7,pulses=off, virtual:seed=7,muscles=1, "
-    "virtual:seed=7,faults=PLAN.toml, simulation:FILE, serial:PORT, "
+    "virtual:seed=7,faults=PLAN.toml, simulation:FILE, serial:PORT, serial:PORT,losses=5, "
     "emulated:ARM or python:module:callable (python:module:callable,every=2), each with ,spec=arm.toml if you like"
 )
 _OPTIONS = (
-    r"(?:seed|preset|joints|coupling|period|rate|sensors|pressure_sensors|pulses|muscles|faults|every|spec)=|"
+    r"(?:seed|preset|joints|coupling|period|rate|sensors|pressure_sensors|pulses|muscles|faults|every|losses|spec)=|"
     r"wide(?:,|$)"
 )
 _LONGEST_NUMBER = 40  # digits, of a seed as well
@@ -47,7 +47,8 @@ def open_arm(name: str, seed: int = 0, spec: Path | None = None) -> Arm:
     (:mod:`pneumarm.arm.virtual.faults`), ``virtual:seed=N,rate=200`` or ``period=0.005`` one that is controlled at
     200 Hz, not at the rate that it is made for, ``virtual:joints=2,seed=N`` a chain of several joints, up to 4, and
     with ``coupling=0.5`` one whose joints act on each other half as much;
-    ``simulation:FILE`` a fitted simulation; ``serial:PORT`` an arm behind a microcontroller on a serial port;
+    ``simulation:FILE`` a fitted simulation; ``serial:PORT`` an arm behind a microcontroller on a serial port, with
+    ``losses=5`` one whose line may be lost so often within a minute (:meth:`~pneumarm.arm.serial.SerialArm.regain`);
     ``emulated:ARM`` an arm behind an emulated microcontroller, as fast as it can be computed;
     ``python:module:callable`` calls ``callable()`` for the arm; with ``every=2`` it is controlled at every second of
     its periods, by default at those that make some 30 Hz of a rate over 50 Hz (:mod:`pneumarm.arm.slower`), as
@@ -110,6 +111,10 @@ def with_options(name: str, **changed: str | None) -> str:
 def _open(place: str, options: Mapping[str, str], seed: int, spec: ArmSpec | None = None) -> Arm:
     name = ":".join([place, *([",".join(map(_option, options.items()))] if options else [])])
     kind, _, rest = place.partition(":")
+    if "losses" in options and kind not in ("serial", "emulated"):
+        raise UnusableInput(f"arm {name!r}: losses= is for arms on a serial port, whose line may be lost")
+    if kind in ("serial", "emulated"):
+        losses, options = _losses(name, options), {key: options[key] for key in options if key != "losses"}
     if kind != "python" and "every" in options:
         raise UnusableInput(
             f"arm {name!r}: every= is for arms of python:; a virtual arm has rate=, a board its arm.toml"
@@ -120,7 +125,7 @@ def _open(place: str, options: Mapping[str, str], seed: int, spec: ArmSpec | Non
         from pneumarm.arm.serial import BoardLine, EmulatedBoard, SerialArm
 
         inner = _open(rest, options, seed, spec)
-        return SerialArm(BoardLine(EmulatedBoard(inner)), replace(spec or inner.spec, name=name))
+        return SerialArm(BoardLine(EmulatedBoard(inner)), replace(spec or inner.spec, name=name), losses=losses)
     if kind == "python" and rest.count(":") == 1 and not options.keys() - {"every"}:
         return _from_python(rest, options.get("every"))
     if options:
@@ -133,7 +138,7 @@ def _open(place: str, options: Mapping[str, str], seed: int, spec: ArmSpec | Non
         from pneumarm.arm.serial.arm import SerialArm
         from pneumarm.arm.serial.port import SerialPort
 
-        return SerialArm(SerialPort(rest), spec or ArmSpec(name=name))
+        return SerialArm(SerialPort(rest), spec or ArmSpec(name=name), losses=losses)
     raise UnusableInput(f"arm {name!r}: expected {_FORMS}")
 
 
@@ -225,6 +230,16 @@ def _parameters(name: str, options: Mapping[str, str]) -> "ArmParameters":
         return replace(parameters, coupling=float(options["coupling"]))
     except ValueError as error:
         raise UnusableInput(f"arm {name!r}: expected a coupling of 0 to 1") from error
+
+
+def _losses(name: str, options: Mapping[str, str]) -> int:
+    """Return how many losses of the line within a minute ``options`` allow."""
+    from pneumarm.arm.serial.arm import LOSSES
+
+    given = options.get("losses", str(LOSSES))
+    if not _is_whole(given):
+        raise UnusableInput(f"arm {name!r}: losses is a number from 0 up, of losses a minute, not {given!r}")
+    return int(given)
 
 
 def _is_whole(text: str) -> bool:

@@ -88,7 +88,7 @@ class OwnArm(ArmWrapper):
         return reading
 
     set_valves, close = _checked("set_valves"), _checked("close")
-    make_ready, set_state = _checked("make_ready"), _checked("set_state")
+    make_ready, regain, set_state = _checked("make_ready"), _checked("regain"), _checked("set_state")
     set_pulses, link_counts = _checked("set_pulses", bool), _checked("link_counts", dict)
     air_used = _checked("air_used", lambda given: None if given is None or not np.isfinite(given) else float(given))
     get_state = _checked("get_state", lambda given: None if given is None else memoryview(given).tobytes())
@@ -112,7 +112,7 @@ class OwnArm(ArmWrapper):
     def _call(self, method: str, *values: object, check: Callable[[Any], Any] | None = None) -> Any:
         """Return what ``method`` of the arm returns, as ``check`` makes it."""
         returned = False
-        if method in ("make_ready", "set_state"):
+        if method in ("make_ready", "regain", "set_state"):
             self._clock = _Clock()  # any time may pass in it
         try:
             given = getattr(self.arm, method)(*values)

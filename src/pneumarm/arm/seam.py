@@ -338,6 +338,13 @@ class Arm(ABC):
         Called before each movement; an arm that was vented for any other reason raises.
         """
 
+    def regain(self) -> None:
+        """Take up the arm again, its valves closed, after a call raised :class:`~pneumarm.errors.LineLost`.
+
+        It may wait for the arm to be there again. One that somebody has to look at first raises another ArmFailure.
+        """
+        self.make_ready()
+
     def link_counts(self) -> dict[str, int]:
         """Return what has happened on the link to the arm so far, by name; nothing where there is no link."""
         return {}

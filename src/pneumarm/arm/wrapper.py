@@ -40,6 +40,10 @@ class ArmWrapper(Arm):
         """Prepare to move after a pause."""
         self.arm.make_ready()
 
+    def regain(self) -> None:
+        """Take up the arm again after its line was lost."""
+        self.arm.regain()
+
     def link_counts(self) -> dict[str, int]:
         """Return what has happened on the link to the arm."""
         return self.arm.link_counts()

@@ -11,6 +11,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from time import perf_counter
 from typing import Annotated
 
@@ -156,14 +157,18 @@ def measure(
     told = progress or (lambda done, total: None)
     joints = guard.spec.joints
     try:
-        first = bench.vent()
-        timing = _timing(guard, settings)
+        done = guard.despite_losses
+        first = done(bench.vent)
+        timing = done(lambda: _timing(guard, settings))
         moved = []
         for joint in range(joints):
-            moved.append((bench.muscle(joint, 0), bench.muscle(joint, 1), bench.sweep(joint)))
+            one, two = (done(partial(bench.muscle, joint, muscle)) for muscle in range(2))
+            moved.append((one, two, done(partial(bench.sweep, joint))))
             told(joint + 1, joints + 1)
-        rest = bench.rest()
-        again = [(bench.again(joint, 0), bench.again(joint, 1)) for joint in range(joints)]
+        rest = done(bench.rest)
+        again = [
+            (done(partial(bench.again, joint, 0)), done(partial(bench.again, joint, 1))) for joint in range(joints)
+        ]
         told(joints + 1, joints + 1)
         tests = [
             JointTest(_trace(first, j), (one, two), sweep, _trace(rest, j), again[j])
@@ -190,9 +195,13 @@ def fill_alone(arm: Arm, joint: int, muscle: int, settings: CheckupSettings = Ch
 
     """
     bench = _Bench(guarded(arm), settings)
-    bench.vent()
-    bench.watch(bench.alone(joint, muscle), settings.fill)
-    bench.watch(bench.valves(joint, 0, 0), settings.hold)
+
+    def fill() -> None:
+        bench.vent()
+        bench.watch(bench.alone(joint, muscle), settings.fill)
+        bench.watch(bench.valves(joint, 0, 0), settings.hold)
+
+    bench.guard.despite_losses(fill)
 
 
 def _timing(guard: GuardedArm, settings: CheckupSettings) -> Timing:

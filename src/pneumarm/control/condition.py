@@ -24,6 +24,7 @@ LINK = {
     "silences": "requests without an answer for a control period or longer",
     "foreign": "late or doubled replies, dropped",
     "corrupt": "damaged frames, dropped",
+    "losses": "times the line was lost and taken up again",
 }
 """What a link counts, in plain words."""
 COLLECTING = "collecting"
@@ -77,6 +78,8 @@ def complaints(results: Mapping[str, Any], doing: str) -> list[str]:
         lines.append(f"late while {doing}: {total.missed_deadlines:,} control periods")
     if total.link.get("silences"):
         lines.append(f"late board while {doing}: {total.link['silences']:,} {LINK['silences']}")
+    if total.link.get("losses"):
+        lines.append(f"line lost while {doing}: {total.link['losses']:,} times, and taken up again")
     return lines
 
 

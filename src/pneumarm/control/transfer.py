@@ -292,12 +292,16 @@ class Transfer:
     def _move(self, controller: Controller, test: bool, number: int) -> Movement:
         """Bring the arm to a begin state and make movement ``number`` of a test or of learning."""
         agent = self._arrived
-        draw = draw_movement(goals_of(agent), self._seed, test, number)
-        BEGIN.reach(self._cycle.arm, draw.random)
         velocity, hold = agent.window.velocity, self._settings.hold if agent.settles else 0.0
-        return move(
-            self._cycle, controller, draw.goal, agent.settings, self._watch, self._broken.append, velocity, hold
-        )
+
+        def moved() -> Movement:
+            draw = draw_movement(goals_of(agent), self._seed, test, number)
+            BEGIN.reach(self._cycle.arm, draw.random)
+            return move(
+                self._cycle, controller, draw.goal, agent.settings, self._watch, self._broken.append, velocity, hold
+            )
+
+        return self._cycle.arm.despite_losses(moved)
 
     def _adapt(self, left: int) -> None:
         """Let the agent adapt where that is due, with so many movements of learning ``left``.
@@ -369,15 +373,18 @@ class Transfer:
             state |= self._learning.get_states()
         if self._adapting is not None:
             state["adaptation"] = self._adapting.get_state()
-        recorded = [replace(one, marks=(*self._watch.marks(one), *one.marks)) for one in self._waiting]
+        recorded = [
+            replace(one, marks=(*self._watch.marks(one), *one.marks)) for one in (*self._broken, *self._waiting)
+        ]
         self._store.append_all(recorded, {name: value for name, value in state.items() if value is not None})
         self._waiting.clear()
+        self._broken.clear()
 
     def _keep_rest(self) -> None:
         """Keep what waits, and nothing twice: a signal may have come between keeping and forgetting it."""
         kept = max(len(self._waiting) - (len(self._done) - len(self._stored())), 0)
-        self._waiting[:] = [*self._waiting[kept:], *self._broken]
-        if self._waiting:
+        del self._waiting[:kept]
+        if self._waiting or self._broken:
             self._keep()
 
     def _result(self) -> Transferred:

@@ -253,6 +253,21 @@ def track(
     """
     check_seconds(seconds)
     cycle = ControlCycle(guarded(arm))
+    return cycle.arm.despite_losses(
+        lambda: _track(cycle, controller, reference, seconds, lead_in, watch, seen, record)
+    )
+
+
+def _track(
+    cycle: ControlCycle,
+    controller: TrackingController,
+    reference: Reference,
+    seconds: float,
+    lead_in: float,
+    watch: Watch | None,
+    seen: Seen | None,
+    record: Recorder | None,
+) -> Tracked:
     cycle.arm.make_ready()
     coming = replace(reference, at=lambda time: reference.at(max(time - lead_in, 0.0)))
     controller.reset(reference.at(0.0))
@@ -325,18 +340,22 @@ def _move_to(
     if goal.shape != (spec.joints,) or not np.isfinite(goal).all():
         raise UnusableInput(f"a goal needs {spec.joints} finite angle(s) in counts, got {goal}")
     switches, air, start = 0, arm.air_used(), arm.read().time
-    for number in range(1, settings.tries + 1):
+
+    def one_try() -> Recorded:
         arm.make_ready()
         controller.reset(goal)
         asked = {"goal": goal.tolist()}
-        recorded = played(cycle, controller, settings.hold, lambda time: goal, watch, seen, record, asked)
+        return played(cycle, controller, settings.hold, lambda time: goal, watch, seen, record, asked)
+
+    for number in range(1, settings.tries + 1):
+        recorded = arm.despite_losses(one_try)
         switches += int(valve_changes(recorded.command[:-1]).sum())
         error = (recorded.angle - goal) / spec.counts_per_degree
         dwell = min(settings.dwell, settings.hold / 2)
         settled = settled_at(recorded.time, error, settings.tolerance, dwell)
         if settled is not None or number == settings.tries:
             break
-        arm.wait(settings.pause)
+        arm.despite_losses(lambda: arm.wait(settings.pause))
     direction = -np.sign(error[0])
     return Moved(
         goal=goal,

@@ -255,13 +255,17 @@ def collect(
     _check(arm, store, transitions, seed)
     begun = wall_clock.perf_counter()
     collection = _Collection(arm, store, seed, settings, controller, goals, watch)
-    try:
+
+    def record() -> None:
         if collection.done < transitions:
             collection.find_fill_times()
         while collection.done < transitions:
             collection.make_sequence(transitions - collection.done if exact else None)
             if progress is not None:
                 progress(min(collection.done, transitions), transitions)
+
+    try:
+        collection.arm.despite_losses(record)
     except BaseException as error:
         with suppress(Exception):  # the first failure is the one to tell of
             arm.close()
@@ -313,10 +317,11 @@ class _Collection:
         """Transitions and sequences that are stored."""
         kept = {name: store.state(name) if self.number else None for name in ("collect", "arm", "watch")}
         self._tally = _Tally(**json.loads(kept["collect"])) if kept["collect"] is not None else _Tally()
-        self._arm = guarded(arm)
+        self.arm = guarded(arm)
         if kept["arm"] is not None:
-            self._arm.set_state(kept["arm"])
+            self.arm.set_state(kept["arm"])
         self._patience, self._doubtful = Patience(arm.spec.name), 0
+        self._link: Mapping[str, int] = self.arm.link_counts()
         if watch is not None:
             if kept["watch"] is not None:
                 watch.set_state(kept["watch"])
@@ -327,16 +332,16 @@ class _Collection:
         if self._settings.complete:
             return
         if self._tally.fill_times is None:
-            start = self._arm.read().time
-            self._tally.fill_times = list(find_fill_times(self._arm))
-            self._tally.seconds += self._arm.read().time - start
+            start = self.arm.read().time
+            self._tally.fill_times = list(find_fill_times(self.arm))
+            self._tally.seconds += self.arm.read().time - start
         self._settings = self._settings.for_arm(FillTimes(*self._tally.fill_times))
 
     def make_sequence(self, most: int | None = None) -> None:
         """Bring the arm to a begin state, carry out one sequence, no longer than ``most`` actions, and store it."""
-        arm, random = self._arm, np.random.default_rng([self._seed, self.number])
+        arm, random = self.arm, np.random.default_rng([self._seed, self.number])
         cycle = ControlCycle(arm, self._settings.close_while_computing)
-        before, start = Counts.now(cycle), arm.read().time
+        before, start = replace(Counts.now(cycle), link=self._link), arm.read().time
         assert self._settings.begin is not None
         end = None if self._controller is not None else end_of(self.number, self._settings.ends, arm.spec.joints)
         if end is None:
@@ -349,7 +354,7 @@ class _Collection:
 
         def broken(steps: list[Step], why: BaseException) -> None:
             recorded = broken_off(steps, arm.spec, why, kind=kind, at_rest=True, info=info)
-            self._tally.add(arm, Counts.now(cycle) - before, steps[-1].reading.time - start if steps else 0.0)
+            self._count(Counts.now(cycle), before, steps[-1].reading.time - start if steps else 0.0)
             if recorded is not None and arm.get_state() is None:  # no arm can make it again
                 with suppress(Exception):  # the first failure is the one to tell of
                     self._keep(recorded, whole=False)
@@ -364,12 +369,17 @@ class _Collection:
             watch=self._watch,
             broken=broken,
         )
-        self._tally.add(arm, Counts.now(cycle) - before, float(made.time[-1]) - start)
+        self._count(Counts.now(cycle), before, float(made.time[-1]) - start)
         self._keep(made, whole=True)
+
+    def _count(self, now: Counts, before: Counts, seconds: float) -> None:
+        """Count what happened in a sequence of so many ``seconds``, and on the link since the last one."""
+        self._tally.add(self.arm, now - before, seconds)
+        self._link = now.link
 
     def _actor(self, random: np.random.Generator, end: "End | None") -> tuple[str, Controller, Mapping[str, object]]:
         """Return the kind of the next sequence, what acts in it, and what else is kept with it."""
-        spec = self._arm.spec
+        spec = self.arm.spec
         if self._controller is None:
             kind, actor = random_actions(spec, self._settings, random, end)
             return kind, actor, {}
@@ -385,7 +395,7 @@ class _Collection:
     def _keep(self, recorded: Recorded, *, whole: bool) -> None:
         """Store a sequence with all that is needed to go on after it, unless it broke off."""
         state, watch = {"collect": json.dumps(asdict(self._tally)).encode()}, self._watch
-        if whole and (arm_state := self._arm.get_state()) is not None:
+        if whole and (arm_state := self.arm.get_state()) is not None:
             state["arm"] = arm_state
         if watch is not None:
             recorded = replace(recorded, marks=(*watch.marks(recorded), *recorded.marks))
@@ -393,18 +403,17 @@ class _Collection:
             state["watch"] = watch.get_state()
             if whole:
                 self._patience.judge(watch, float(recorded.time[-1]))
-        before, recorded = len(recorded.marks), with_doubtful_marked(recorded, self._arm.spec, valves=True)
+        before, recorded = len(recorded.marks), with_doubtful_marked(recorded, self.arm.spec, valves=True)
         doubtful = recorded.marks[before:]
         self._store.append(recorded, state)
         self._doubtful = 0 if joinable(recorded.step, doubtful) else self._doubtful + 1
         if self._doubtful >= MOST_SPOILED and doubtful:
             raise ArmFailure(
-                f"{self._arm.spec.name}: {doubtful[0].reason}, in {self._doubtful} sequences in a row; they are "
+                f"{self.arm.spec.name}: {doubtful[0].reason}, in {self._doubtful} sequences in a row; they are "
                 "stored and marked, nothing can be learned of them. See to the sensor and run the same command again"
             )
-        if whole:
-            self.done += recorded.transitions
-            self.number += 1
+        self.done += recorded.transitions
+        self.number += 1
 
     def result(self, wall_seconds: float) -> CollectResult:
         """Return what there is of it now, after a call that took ``wall_seconds`` [s]."""

@@ -8,6 +8,7 @@ from tests.firmware.mutations import is_request
 
 from pneumarm.arm import Arm
 from pneumarm.arm.serial import BoardLine, EmulatedBoard, FaultyLine, SerialArm
+from pneumarm.arm.serial.arm import LOSSES
 from pneumarm.arm.serial.protocol import VERSION
 from pneumarm.arm.virtual import VirtualArm, draw_parameters
 
@@ -82,14 +83,34 @@ class Wired:
         return all(valve == -1 for joint in self.applied for valve in joint)
 
 
-def wired(seed: int = 1, period: float = 1 / 30, version: int = VERSION, cut_off: float | None = None) -> Wired:
+def wired(
+    seed: int = 1,
+    period: float = 1 / 30,
+    version: int = VERSION,
+    cut_off: float | None = None,
+    losses: int = LOSSES,
+) -> Wired:
     muscles = WatchedArm(seed)
     board = EmulatedBoard(muscles, version)
     line = WatchedLine(board, muscles)
     faulty = FaultyLine(line)
-    arm = SerialArm(faulty, replace(muscles.spec, period=period), cut_off=cut_off)
+    arm = SerialArm(faulty, replace(muscles.spec, period=period), cut_off=cut_off, losses=losses)
     return Wired(muscles, board, line, faulty, arm)
 
 
 def all_valves(arm: Arm, value: int) -> np.ndarray:
     return np.full((arm.spec.joints, 2), value, np.int8)
+
+
+def stalling(w: Wired, stall: float) -> None:
+    """Have the board do nothing with what comes for ``stall`` [s] from now; it answers all of it then."""
+    until, receive, kept = w.line.now() + stall, w.board.receive, []
+
+    def late(data: bytes) -> bytes:
+        kept.append(data)
+        if w.line.now() < until:
+            return b""
+        w.board.receive = receive  # type: ignore[method-assign]
+        return receive(b"".join(kept))
+
+    w.board.receive = late  # type: ignore[method-assign]

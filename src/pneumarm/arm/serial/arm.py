@@ -1,6 +1,8 @@
 """An arm behind a microcontroller that speaks the protocol."""
 
+import logging
 import secrets
+from collections import deque
 from contextlib import suppress
 from dataclasses import asdict, replace
 from typing import NamedTuple, NoReturn
@@ -43,7 +45,7 @@ from pneumarm.arm.serial.protocol import (
     summed,
     unpack_valves,
 )
-from pneumarm.errors import ArmFailure, UnusableInput
+from pneumarm.errors import ArmFailure, LineLost, UnusableInput
 
 CONVERSIONS = 5
 """Conversions of which the board sends the median (thesis A.1.3)."""
@@ -59,6 +61,15 @@ BOOT = 3.0
 """Longest time to wait for a board that opening the port has reset [s]."""
 KNOCK = 0.1
 """Time between two CONNECTs to a board that may still be booting [s]."""
+LOSSES = 5
+"""Losses of the line within a minute that are made good; at one more whoever moves the arm gives up."""
+AWAY = 600.0
+"""Longest time to look for a board whose line was lost [s]."""
+_LOOK = 1.0  # s between two looks for it
+_MINUTE = 60.0  # s
+_BOOTS = 1 << 16  # the board's count of its restarts begins again
+_MOST_BOOTS = 256  # of one board while its line was lost: each time that the port is opened may restart it
+_log = logging.getLogger("pneumarm")
 _CAUSES = {
     Cause.POWER_ON: "power on",
     Cause.EXTERNAL: "reset pin",
@@ -99,7 +110,8 @@ class SerialArm(Arm):
 
     Whatever the board does by itself (vents a muscle over its limit, vents all when the host is silent,
     restarts) makes the next :meth:`set_valves` fail and stays until :meth:`rearm`, or until :meth:`make_ready` before
-    a movement where only the silence of this host was the cause.
+    a movement where only the silence of this host was the cause. After that, and after a lost line, :meth:`regain`
+    takes up the same board with the same firmware, and no other.
 
     Args:
         line: to the board; it is opened again by :meth:`rearm` if it failed.
@@ -107,6 +119,7 @@ class SerialArm(Arm):
         conversions: 5, 7 or 9, of which each value is the median.
         velocity_ms: time over which the board averages the velocity [ms].
         cut_off: pressure [bar] at which the board cuts a muscle off; 1.5 times ``spec.max_pressure`` by default.
+        losses: most losses of the line within a minute after which :meth:`regain` takes the arm up again.
 
     Raises:
         UnusableInput: more joints or sensors than the board has pins for, or a board of another protocol.
@@ -122,6 +135,7 @@ class SerialArm(Arm):
         conversions: int = CONVERSIONS,
         velocity_ms: int = VELOCITY_MS,
         cut_off: float | None = None,
+        losses: int = LOSSES,
     ) -> None:
         if spec.joints > JOINTS:
             raise UnusableInput(f"{spec.name}: a board has pins for {JOINTS} joints, not for {spec.joints}")
@@ -148,6 +162,9 @@ class SerialArm(Arm):
         self._settings = (conversions, velocity_ms, *[limit] * MUSCLES)
         self._limit = limit / spec.counts_per_bar
         self._session = 0
+        self._losses, self._lost_at = losses, deque[float](maxlen=losses + 1)
+        self._known: Hello | None = None  # what the board said of itself before it was armed
+        self._reopened = False  # the line, since then
         try:
             self._connect()
             self._arm()
@@ -220,6 +237,63 @@ class SerialArm(Arm):
         if not flags & Flag.ARMED:
             self._arm()
 
+    def regain(self) -> None:
+        """Take up the arm after its line was lost, or after its dead-man vented it; wait for the board if need be.
+
+        Raises:
+            ArmFailure: a person has to look: another board, other firmware, a board that restarted by itself,
+                a muscle over its limit; or the line is lost too often, or for too long.
+
+        """
+        begun, why = self._line.now(), self.link.lost or "its dead-man vented the arm"
+        self._lost_at.append(begun)
+        if len(self._lost_at) > self._losses and begun - self._lost_at[0] <= _MINUTE:
+            raise self.link.lose(
+                f"the line was lost {len(self._lost_at)} times within a minute ({why}); check cable, plug and power, "
+                f"or allow more losses a minute (an arm called NAME,losses=N; now {self._losses})",
+                ArmFailure,
+            )
+        _log.warning("%s: %s; looking for the board", self.spec.name, why)
+        while True:
+            try:
+                self._take_up()
+                break
+            except LineLost as error:
+                if self._line.now() - begun >= AWAY:
+                    raise self.link.lose(
+                        f"the board was not found again within {AWAY / 60:g} min ({error})", ArmFailure
+                    ) from error
+            self._line.sleep_until(self._line.now() + _LOOK)
+        self.link.counts.losses += 1
+        _log.warning("%s: taken up again after %.1f s", self.spec.name, self._line.now() - begun)
+
+    def _take_up(self) -> None:
+        """Arm the board again, connecting first if the link is lost."""
+        if self.link.lost is None:
+            self.make_ready()
+            return
+        latched = self._connect() & LATCHES & ~Flag.DEAD_MAN
+        wrong = self._unlike()
+        if wrong is not None:
+            raise self.link.lose(f"{wrong}, and stays vented; check it and run the same command again", ArmFailure)
+        if latched:
+            self._fail(latched)
+        self._arm()
+
+    def _unlike(self) -> str | None:
+        """Return why the board that is connected may not be taken up for the one before; None where it may."""
+        before, now = self._known, self.hello
+        if before is None or now is None:
+            return "no board was connected before"
+        boots = (now.boots - before.boots) % _BOOTS
+        if now.firmware != before.firmware or boots > _MOST_BOOTS:
+            return "another board, or one with other firmware, answers"
+        causes = Cause(now.reset_cause)
+        told = bool(causes & (Cause.POWER_ON | Cause.EXTERNAL)) or (not causes and self._reopened)
+        if boots and (causes & Cause.WATCHDOG or not told):
+            return f"the board restarted by itself ({', '.join(self.reset_causes()) or 'nobody knows why'})"
+        return None
+
     def rearm(self) -> None:
         """Connect again, opening the line again if it had failed, and arm: a person has looked at the arm.
 
@@ -243,8 +317,8 @@ class SerialArm(Arm):
         finally:
             self._line.close()
 
-    def _connect(self) -> None:
-        """Have a board that may still be booting answer, then configure it."""
+    def _connect(self) -> Flag:
+        """Have a board that may still be booting answer, then configure it; return its flags."""
         self._armed = False
         begun = self._line.now()
         while True:
@@ -252,22 +326,24 @@ class SerialArm(Arm):
                 self._greet()
                 break
             except OSError as error:
-                raise ArmFailure(f"{self.spec.name}: the line is gone ({error})") from error
+                raise self.link.lose(f"the line is gone ({error})") from error
             except ArmFailure as error:
                 if self.link.broken:
                     raise
                 if self._line.now() - begun >= BOOT:
-                    raise ArmFailure(
+                    self.link.broken = True  # a driver may hang, so that it has to be opened again
+                    raise LineLost(
                         f"{self.spec.name}: nobody answered for {BOOT:g} s. Is this the right port, is the "
                         "board powered, is pneumarm's firmware on it?"
                     ) from error
         self._clock = BoardClock()
-        self._status(self.link.ask(Request.CONFIGURE, *self._settings))
+        return self._status(self.link.ask(Request.CONFIGURE, *self._settings))
 
     def _greet(self) -> None:
         """Begin a session, on a line that works."""
         if self.link.broken:
             self._line.reopen()
+            self._reopened = True
         self.link.begin()
         self._line.write(b"\0")  # ends whatever an earlier host left unfinished
         self._session = secrets.randbits(32)
@@ -289,6 +365,7 @@ class SerialArm(Arm):
     def _arm(self) -> None:
         self._status(self.link.ask(Request.ARM, self._session))
         self._armed = True
+        self._known, self._reopened = self.hello, False
         self._command = _whole(self._closed_valves)
         self._fed = self._line.now()
 
@@ -350,7 +427,8 @@ class SerialArm(Arm):
         causes = f" ({', '.join(self.reset_causes())})" if self.link.lost is None and self.reset_causes() else ""
         raise self.link.lose(
             f"the board restarted while in use{causes}, all muscles are vented; check its power, its plug "
-            "and, after a hang, its firmware"
+            "and, after a hang, its firmware",
+            ArmFailure,
         )
 
     def _fail(self, flags: Flag) -> NoReturn:
@@ -368,7 +446,7 @@ class SerialArm(Arm):
         if flags & Flag.CONVERTER:
             raise ArmFailure(f"{self.spec.name}: the board's converter stopped, all muscles are vented")
         self._armed = False
-        raise ArmFailure(
+        raise LineLost(
             f"{self.spec.name}: the board heard nothing for a quarter of a second and vented all muscles; "
             "this computer was too busy or asleep, or the line or the board was silent for so long"
         )

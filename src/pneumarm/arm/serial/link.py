@@ -7,7 +7,7 @@ from typing import NamedTuple
 from pneumarm.arm.serial.line import Line
 from pneumarm.arm.serial.pace import Pace
 from pneumarm.arm.serial.protocol import ANSWER, DEAD_MAN_MS, SEQUENCES, Frame, Reply, Request, Splitter, encode
-from pneumarm.errors import ArmFailure
+from pneumarm.errors import ArmFailure, LineLost
 
 DEAD_MAN = DEAD_MAN_MS / 1e3
 """Time after which a board that hears nothing vents the arm by itself [s]."""
@@ -36,6 +36,8 @@ class LinkCounts:
     """Replies to something else than what was asked: late, or doubled."""
     corrupt: int = 0
     """Frames that could not be taken."""
+    losses: int = 0
+    """Times that the line was lost and the arm taken up again."""
 
 
 class Answer(NamedTuple):
@@ -74,6 +76,7 @@ class Link:
         """Why nothing can be asked any more; None while all is well."""
         self.broken = False
         """Whether it is lost because the line itself failed, so that it has to be opened again."""
+        self._failure: type[ArmFailure] = LineLost
         self._period = period
         self._name = name
         self._sequence = sequence
@@ -90,7 +93,7 @@ class Link:
         """Return the answer to ``request``.
 
         Raises:
-            ArmFailure: the line fails, or nothing is heard for too long.
+            LineLost: the line fails, or nothing is heard for too long.
 
         """
         return self._asked(request, values, None)
@@ -99,14 +102,14 @@ class Link:
         """Return the answer to ``request``, which is sent once and waited for for ``wait`` [s].
 
         Raises:
-            ArmFailure: the line fails, or nothing is heard.
+            LineLost: the line fails, or nothing is heard.
 
         """
         return self._asked(request, values, wait)
 
     def _asked(self, request: Request, values: tuple[int, ...], wait: float | None) -> Answer:
         if self.lost is not None:
-            raise ArmFailure(f"{self._name}: {self.lost}")
+            raise self._failure(f"{self._name}: {self.lost}")
         try:
             return self._ask(request, values, wait)
         except OSError as error:
@@ -159,7 +162,7 @@ class Link:
         if self.counts.silences == 1:
             _log.warning("%s: the board is late, and asked again for up to %g s", self._name, GIVE_UP)
 
-    def lose(self, why: str) -> ArmFailure:
-        """Ask nothing more until :meth:`begin`, and return the failure to raise."""
-        self.lost = why
-        return ArmFailure(f"{self._name}: {why}")
+    def lose(self, why: str, failure: type[ArmFailure] = LineLost) -> ArmFailure:
+        """Ask nothing more until :meth:`begin`, and return the ``failure`` to raise now and until then."""
+        self.lost, self._failure = why, failure
+        return failure(f"{self._name}: {why}")

@@ -5,6 +5,7 @@ import sys
 import time
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 from serial.tools import list_ports
 
@@ -25,17 +26,19 @@ class SerialPort(Line):
     def __init__(self, path: str) -> None:
         self._path = path
         self._port = _opened(path)
+        self._usb = _usb_of(path)
 
     def reopen(self) -> None:
-        """Open the port again, as after the plug was out.
+        """Open the port again, as after the plug was out; where its USB device is at another one by now, that.
 
         Raises:
             OSError: it is still gone, or another program took it.
 
         """
         self.close()
+        path = self._path if self._usb is None else _path_of(self._usb, self._path)
         try:
-            self._port = _opened(self._path)
+            self._port = _opened(path)
         except UnusableInput as error:
             raise OSError(str(error)) from error
 
@@ -69,6 +72,33 @@ class SerialPort(Line):
         """Close the port."""
         with suppress(OSError, serial.SerialException):
             self._port.close()
+
+
+def _usb_of(path: str) -> tuple[object, ...] | None:
+    """Return by what the USB device at ``path`` is known again; None where nothing tells it from others."""
+    for port in list_ports.comports():
+        if os.path.realpath(port.device) == os.path.realpath(path):
+            return _identity(port)
+    return None
+
+
+def _identity(port: Any) -> tuple[object, ...] | None:
+    """Return maker, product and serial number of a USB device, its socket in place of a number that is missing."""
+    return (port.vid, port.pid, port.serial_number or port.location) if port.vid is not None else None
+
+
+def _path_of(usb: tuple[object, ...], before: str) -> str:
+    """Return where the device ``usb`` is now, that was at ``before``.
+
+    Raises:
+        OSError: it is nowhere.
+
+    """
+    found = [port.device for port in list_ports.comports() if _identity(port) == usb]
+    if not found:
+        raise OSError(f"the board that was at {before} is at no port")
+    same = [path for path in found if os.path.realpath(path) == os.path.realpath(before)]
+    return before if same else str(found[0])
 
 
 def _opened(path: str) -> serial.Serial:

@@ -27,6 +27,10 @@ COMMANDS = {
         "Do the whole job: collect, fit, train, test, transfer, report. Resumable.",
         "pneumarm run --arm virtual:seed=7 --out runs/seven --transitions 20000",
     ),
+    "setup": (
+        "Guide you through an arm's first day: board, valves, sensors, calibration, learning.",
+        "pneumarm setup serial:/dev/ttyACM0",
+    ),
     "collect": (
         "Make an arm move about and record it.",
         "pneumarm collect virtual arm.db --transitions 20000",
@@ -147,7 +151,7 @@ COMMANDS = {
 """Every command with its one-line help and an example."""
 
 PANELS = {
-    "Begin here": ("run", "live", "move", "track", "view"),
+    "Begin here": ("run", "live", "setup", "move", "track", "view"),
     "Step by step": ("collect", "coverage", "fit", "analyse", "train", "test", "transfer", "versions", "report"),
     "The arm, and other controllers": ("arm", "tune", "bound"),
     "To other programs and places": ("import", "export", "copy"),
@@ -157,11 +161,11 @@ PANELS = {
 """Where commands are found in the help, in this order."""
 
 MOVING = (
-    "run", "collect", "transfer", "move", "track", "live", "tune",
+    "run", "collect", "transfer", "move", "track", "live", "tune", "setup",
     "arm check", "arm calibrate", "arm sensors", "arm valves",
 )  # fmt: skip
 """Commands that leave an arm, which may be anybody's, closed."""
-RESUMED = ("run", "collect", "transfer", "experiment")
+RESUMED = ("run", "collect", "transfer", "setup", "experiment")
 """Commands that go on, when they are called again, where they were interrupted."""
 
 _NO_BUG = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES, errno.EPERM, errno.EIO)
@@ -201,6 +205,7 @@ for _group in _groups.values():
     app.command(_group)
 _USAGE = {
     "move": "Usage: pneumarm move CONTROLLER --arm ARM [OPTIONS] GOALS...",
+    "setup": "Usage: pneumarm setup [ARM] [OPTIONS]",
     "live": "Usage: pneumarm live [CONTROLLERS...] [OPTIONS]",
 }
 """Usage of commands that take any number of words."""

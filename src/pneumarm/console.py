@@ -117,7 +117,7 @@ def _short(value: Any) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, float):
-        return f"{value:.4g}"
+        return f"{value:z.4g}"
     if isinstance(value, list | tuple):
         return ", ".join(map(_short, value)) or "none"
     return str(value)

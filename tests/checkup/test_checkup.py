@@ -16,7 +16,7 @@ from faulty_arm import FAULTS, FaultyArm, logarithmic
 from pneumarm.arm import GuardedArm, guarded, open_arm
 from pneumarm.arm.corrected import CorrectedArm
 from pneumarm.arm.serial import BoardLine, EmulatedBoard, SerialArm
-from pneumarm.arm.spec_file import load_arm_file
+from pneumarm.arm.spec_file import load_arm_file, save_spec
 from pneumarm.arm.virtual import (
     Leak,
     LogarithmicPotentiometer,
@@ -27,10 +27,20 @@ from pneumarm.arm.virtual import (
 )
 from pneumarm.checkup import CheckupSettings, Known, calibrate, diagnose, ends, joint_figures, measure
 from pneumarm.checkup.diagnose import WORN
-from pneumarm.checkup.figures import LAGS, autocorrelation, dropped, irregularity, ljung_box, onset
-from pneumarm.checkup.measure import JointTest, MuscleTest, Trace
+from pneumarm.checkup.figures import (
+    LAGS,
+    autocorrelation,
+    dropped,
+    irregularity,
+    joint_row,
+    ljung_box,
+    muscle_row,
+    onset,
+)
+from pneumarm.checkup.measure import JointTest, MuscleTest, Trace, arm_seconds
 from pneumarm.cli import main
 from pneumarm.commands import asking
+from pneumarm.console import table
 from pneumarm.errors import ArmFailure, UnusableInput
 
 
@@ -444,7 +454,7 @@ def test_the_commands(capsys, tmp_path, monkeypatch):
     assert not (tmp_path / "no.toml").exists()
 
     code, out, err = run(capsys, "arm", "valves", "virtual", "--pause", 0.1, "--json")
-    assert [c["opened"] for c in json.loads(out)["clicked"]] == [True] * 4
+    assert [c["permitted"] for c in json.loads(out)["clicked"]] == [True] * 4
     assert err.splitlines() == [f"joint 1, muscle {m}, {v}" for m in (1, 2) for v in ("inlet", "exhaust")]
 
 
@@ -496,20 +506,68 @@ def test_a_person_is_asked_while_the_arm_is_held(monkeypatch):
     guard = guarded(arm)
     checkup = measure(guard)
     master, slave = pty.openpty()
-    asked = []
+    asked, said, kept = [], [], []
 
     def say(text):
+        said.append(text)
+        if "protractor" not in text:
+            return
         asked.append(text)
-        guard.wait(5.0)  # a person takes time
+        guard.wait(65.0 if len(asked) == 5 else 5.0)  # a person takes time
         true = inner.spec.degrees(arm.read().angle)[0]
-        os.write(master, b"about thirty\n" if len(asked) == 1 else f"{true:.1f}\n".encode())
+        # Nonsense, a wrong sign at either end, the air let out before a late answer, and it is moved there again.
+        wrong = {1: "about thirty", 2: f"{-true:.1f}", 3: f"{-true:.1f}", 5: ""}
+        os.write(master, f"{wrong.get(len(asked), f'{true:.1f}')}\n".encode())
 
-    monkeypatch.setattr(asking, "say", lambda text: say(text) if "protractor" in text else None)
+    monkeypatch.setattr(asking, "say", say)
     with open(slave) as terminal, guard:
         monkeypatch.setattr(sys, "stdin", terminal)
-        known = asking.asked_for(guard, checkup, Known(counts_per_bar=166.0))
+        known = asking.asked_for(guard, checkup, Known(counts_per_bar=166.0), asking.Person(), kept.append)
+        arm.wait(2.0)
+        assert arm.read().pressure.max() < 10  # nothing is kept full
     os.close(master)
-    assert len(asked) == 3
+    assert len(asked) == 6
+    assert sum("is not a number" in one for one in said) == 1
+    assert sum("That is not possible: muscle 1 turns joint 1 to the higher angle" in one for one in said) == 1
+    assert sum("The air is let out meanwhile." in one for one in said) == 1
+    assert kept == [known]
     spec = calibrate(checkup, known).file.spec
     assert spec.counts_per_degree == pytest.approx(inner.spec.counts_per_degree, rel=0.01)
     assert sum(spec.angle_range) / 2 == pytest.approx(sum(inner.spec.angle_range) / 2, abs=8)
+
+
+@pytest.mark.parametrize("joints", [1, 2])
+def test_how_far_a_check_up_is_is_told_in_the_arms_time(joints):
+    arm, told = open_arm(f"virtual:seed=3,joints={joints}"), []
+    settings = CheckupSettings(rest=5.0, settle=2.0)
+    begun = arm.read().time
+    measure(arm, settings, progress=lambda done, total: told.append((done, total)))
+    took = arm.read().time - begun
+    done, total = np.array(told).T
+    assert took == pytest.approx(arm_seconds(arm.spec, settings), rel=0.05)
+    assert set(total) == {arm_seconds(arm.spec, settings)}
+    assert (np.diff(done) >= 0).all()
+    assert np.diff(done)[:-1].max() < 5.0  # it never stands still for long
+    assert done[-1] == total[-1]
+
+
+def test_it_is_said_what_the_board_has_and_what_of_it_is_in_use(capsys, tmp_path):
+    save_spec(replace(open_arm("virtual:seed=3,joints=2").spec, pressure_sensors=True), tmp_path / "two.toml")
+    _, _, err = run(capsys, "arm", "sensors", "emulated:virtual:seed=3", "--seconds", 0.1)
+    assert "In use: 1 of the board's 2 joints, with 4 of its 8 valves and 3 of its 6 sensors; for both write" in err
+    two = f"emulated:virtual:joints=2,seed=3,spec={tmp_path / 'two.toml'}"
+    _, _, err = run(capsys, "arm", "valves", two, "--pause", 0.01, "--open-for", 0.01)
+    assert "In use: 2 of the board's 2 joints, with 8 of its 8 valves and 6 of its 6 sensors." in err
+    _, out, err = run(capsys, "arm", "valves", "virtual:seed=3,muscles=1", "--pause", 0.01, "--open-for", 0.01)
+    assert "In use" not in err
+    assert "the guard permits it" in out
+    assert err.splitlines() == ["joint 1, muscle 1, inlet", "joint 1, muscle 1, exhaust"]
+
+
+def test_no_zero_is_negative():
+    figures = joint_figures(measure(open_arm("virtual:seed=3"), CheckupSettings(rest=1.0)), 0)
+    muscle = figures.muscles[0]
+    figures = replace(figures, muscles=(replace(muscle, leak=-0.001, leap=-0.0001), muscle), lowest=511.4)
+    rows = [*muscle_row(figures, 0, 0, None), *joint_row(figures, open_arm("virtual:seed=3").spec)]
+    assert not [one for one in rows if one.startswith(("-0", "\u22120")) and not float(one[1:].split("\xa0")[0])]
+    assert list(table(("",), [(-0.0,)]).columns[0].cells) == ["0"]

@@ -2,7 +2,8 @@
 
 An ``arm.toml`` holds a table ``[spec]`` with the fields of :class:`~pneumarm.arm.ArmSpec`, and, where a calibration
 found that readings must be corrected, a table ``[correction]`` with those of :class:`SensorCorrection`, and a table
-``[sound]`` with what the arm did then, those of :class:`SoundState`::
+``[sound]`` with what the arm did then, those of :class:`SoundState`. ``pneumarm setup`` keeps what was answered in a
+table ``[setup]`` until the arm is calibrated, see :class:`Answers`::
 
     [spec]
     joints = 1
@@ -40,6 +41,7 @@ from numpy.typing import NDArray
 from pneumarm.arm.seam import ArmSpec, Sensor
 from pneumarm.errors import UnusableInput
 from pneumarm.files import as_toml, read_toml, write_text
+from pneumarm.settings import NonNegativeInt, PositiveFloat
 
 _LARGEST = 1 << 18
 """Largest file that is read [bytes]: a thousand times what it needs."""
@@ -128,12 +130,35 @@ class SoundState:
 
 
 @dataclass(frozen=True)
+class Answers:
+    """What a person has answered to ``pneumarm setup`` so far, of an arm that is not calibrated yet."""
+
+    questions: NonNegativeInt = 0
+    """Questions about the arm that are answered; the answers are in the spec."""
+    supply: PositiveFloat | None = None
+    """Pressure of the supply [bar gauge]."""
+    counts_per_degree: PositiveFloat | None = None
+    """Of the angle's sensors, of an arm that is not measured."""
+    valves: NonNegativeInt = 0
+    """Valves that were heard to click, in their order."""
+    turned: NonNegativeInt = 0
+    """Joints whose angle has followed the hand."""
+    angles: tuple[tuple[float, float], ...] = ()
+    """Angles of the first joints with muscle 2 full and with muscle 1 full, by a protractor [degrees]."""
+
+    def __post_init__(self) -> None:
+        if not all(map(_rising, self.angles)):
+            raise UnusableInput("[setup] angles needs a lower and a higher one a joint")
+
+
+@dataclass(frozen=True)
 class ArmFile:
     """The content of an ``arm.toml``."""
 
     spec: ArmSpec
     correction: SensorCorrection = SensorCorrection()
     sound: SoundState | None = None
+    setup: Answers | None = None
 
     def __post_init__(self) -> None:
         if not self.correction.fits(self.spec.joints):
@@ -173,7 +198,8 @@ def load_arm_file(path: Path | str) -> ArmFile:
     found = read_toml(path, expected, _LARGEST)
     try:
         _refuse_unknown(found, ArmFile, "")
-        for part, kind in (("spec", ArmSpec), ("correction", SensorCorrection), ("sound", SoundState)):
+        parts = {"spec": ArmSpec, "correction": SensorCorrection, "sound": SoundState, "setup": Answers}
+        for part, kind in parts.items():
             if isinstance(found.get(part), dict):
                 _refuse_unknown(found[part], kind, f"[{part}] ")
         for sensor in _tables(found.get("spec"), "sensors"):
@@ -195,6 +221,8 @@ def save_arm_file(known: ArmFile, path: Path | str) -> None:
         tables["correction"] = asdict(known.correction)
     if known.sound is not None:
         tables["sound"] = asdict(known.sound)
+    if known.setup is not None:
+        tables["setup"] = asdict(known.setup)
     lines = ["# An arm as pneumarm knows it: angles and pressures in sensor counts, times in seconds."]
     for name, table in tables.items():
         entries = [f"{key} = {as_toml(value)}" for key, value in table.items() if value is not None and value != ()]

@@ -1,5 +1,7 @@
 """An arm that passes everything on to the arm behind it: the base of those that change or watch one thing."""
 
+from typing import TypeVar
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -59,3 +61,13 @@ class ArmWrapper(Arm):
     def close(self) -> None:
         """Close the arm."""
         self.arm.close()
+
+
+Kind = TypeVar("Kind", bound=Arm)
+
+
+def unwrapped(arm: Arm | None, kind: type[Kind]) -> Kind | None:
+    """Return the arm of a ``kind`` behind ``arm``, which may be guarded, paced or corrected; None where none is."""
+    while arm is not None and not isinstance(arm, kind):
+        arm = getattr(arm, "arm", None)
+    return arm

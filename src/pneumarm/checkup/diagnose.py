@@ -271,7 +271,7 @@ def _of_calibration(
     moved = (ends(test) - calibrated) / spec.counts_per_degree
     if np.abs(moved).max() > ENDS:
         detail = (
-            f"its ends are {moved[0]:+.1f} and {moved[1]:+.1f} degrees from where they were; the potentiometer has "
+            f"its ends are {moved[0]:+z.1f} and {moved[1]:+z.1f} degrees from where they were; the potentiometer has "
             "slipped on its axis, the muscles or their mounting have changed, or the spec is of another arm"
         )
         yield Complaint("not as calibrated", name, detail, _AGAIN)

@@ -364,7 +364,7 @@ def muscle_row(figures: JointFigures, joint: int, muscle: int, sound: SoundState
 
 def _told(value: float, form: str) -> str:
     """Return ``value`` for people: with a minus, not a hyphen, and a dash where it is not known."""
-    return _NONE if np.isnan(value) else format(value, form).replace("-", "−")
+    return _NONE if np.isnan(value) else format(value, f"z{form}").replace("-", "−")
 
 
 _NONE = "–"

@@ -8,6 +8,7 @@ a straight line's through what is left, by least squares; what the rubber does b
 waited for, and as far as it lasts, it is in the rate of the healthy arm too.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -80,8 +81,13 @@ def leak_test(arm: Arm, test: LeakTest | None = None) -> LeakRates:
     return LeakRates(*falling(time, pressure - squeezed), float(time[-1] - begin))
 
 
-def watch_closed(guard: GuardedArm, test: LeakTest) -> list[Reading]:
-    """Fill all muscles, close them, and return what is read after they have settled; the arm is left closed."""
+def watch_closed(
+    guard: GuardedArm, test: LeakTest, seen: Callable[[Reading], None] = lambda reading: None
+) -> list[Reading]:
+    """Fill all muscles, close them, and return what is read after they have settled; the arm is left closed.
+
+    ``seen`` is called with each reading.
+    """
     closed = np.zeros_like(guard.applied)
     guard.read()
     guard.set_valves(closed + 1)
@@ -91,6 +97,7 @@ def watch_closed(guard: GuardedArm, test: LeakTest) -> list[Reading]:
     readings = []
     for _ in range(max(3, round(test.watch / test.step))):
         readings.append(guard.read())
+        seen(readings[-1])
         guard.wait(test.step)
     return readings
 

@@ -143,7 +143,9 @@ def measure(
     *,
     progress: Callable[[float, float], None] | None = None,
 ) -> Checkup:
-    """Check ``arm``, whose joints must be free to move, for some two minutes; it is left vented and closed.
+    """Check ``arm``, whose joints must be free to move, for :func:`arm_seconds`; it is left vented and closed.
+
+    ``progress`` is told the seconds of the arm's time so far, and those of all of it.
 
     Raises:
         UnusableInput: the arm has no pressure sensors, or one muscle a joint.
@@ -153,9 +155,10 @@ def measure(
     _require_pressures(arm)
     arm.spec.require_pairs("a check-up compares the two muscles of a joint")
     guard = guarded(arm)
-    bench = _Bench(guard, settings)
+    joints, total = guard.spec.joints, arm_seconds(guard.spec, settings)
     told = progress or (lambda done, total: None)
-    joints = guard.spec.joints
+    begun = guard.despite_losses(guard.read).time
+    bench = _Bench(guard, settings, lambda time: told(min(time - begun, total), total))
     try:
         done = guard.despite_losses
         first = done(bench.vent)
@@ -164,12 +167,11 @@ def measure(
         for joint in range(joints):
             one, two = (done(partial(bench.muscle, joint, muscle)) for muscle in range(2))
             moved.append((one, two, done(partial(bench.sweep, joint))))
-            told(joint + 1, joints + 1)
         rest = done(bench.rest)
         again = [
             (done(partial(bench.again, joint, 0)), done(partial(bench.again, joint, 1))) for joint in range(joints)
         ]
-        told(joints + 1, joints + 1)
+        told(total, total)
         tests = [
             JointTest(_trace(first, j), (one, two), sweep, _trace(rest, j), again[j])
             for j, (one, two, sweep) in enumerate(moved)
@@ -177,6 +179,16 @@ def measure(
         return Checkup(guard.spec, settings, timing, tuple(tests))
     finally:
         guard.set_valves(np.zeros_like(guard.applied))
+
+
+def arm_seconds(spec: ArmSpec, settings: CheckupSettings = CheckupSettings()) -> float:
+    """Return about how long a check-up takes on an arm [s]."""
+    s, still = settings, settings.sweep_settle + _STILL
+    muscle = 4 * s.exhaust + s.fill + 2 * s.hold + s.pulse
+    sweep = s.exhaust + s.fill + still + 2 * s.sweep_steps * (1.5 * s.sweep_pulse + still)
+    again = 2 * s.exhaust + s.fill
+    rest = s.exhaust + s.fill + s.settle + s.rest
+    return s.exhaust + s.repeats // 4 * spec.period + spec.joints * (2 * muscle + sweep + 2 * again) + rest
 
 
 def _require_pressures(arm: Arm) -> None:
@@ -227,14 +239,24 @@ def _timing(guard: GuardedArm, settings: CheckupSettings) -> Timing:
     return Timing(timed(guard.read), timed(set_and_read), periods)
 
 
+_STILL = 0.1  # s over which an arm that stands still is read
+_TELL = 0.5  # s between two times that it is told how far it is
 _FLOWING = 0.4  # of what a muscle is filled with: until then air flows nearly as fast as at first
 
 
 class _Bench:
     """Moves an arm for its check-up."""
 
-    def __init__(self, guard: GuardedArm, settings: CheckupSettings) -> None:
-        self.guard, self.settings = guard, settings
+    def __init__(
+        self, guard: GuardedArm, settings: CheckupSettings, told: Callable[[float], None] = lambda time: None
+    ) -> None:
+        self.guard, self.settings, self._told, self._last = guard, settings, told, -np.inf
+
+    def tell(self, reading: Reading) -> None:
+        """Tell now and then what time it is on the arm's clock."""
+        if reading.time - self._last >= _TELL:
+            self._last = reading.time
+            self._told(reading.time)
 
     def valves(self, joint: int, first: int, second: int) -> NDArray[np.int8]:
         """Return the valves of ``joint``; those of all others closed."""
@@ -266,6 +288,7 @@ class _Bench:
             due = max(due + step, now)
             self.guard.wait(max(due - now, 0.0))
             readings.append(self.guard.watch())
+            self.tell(readings[-1])
         return readings
 
     def muscle(self, joint: int, muscle: int) -> MuscleTest:
@@ -295,7 +318,8 @@ class _Bench:
         """Fill all muscles, close them, let them settle, and read."""
         wanted = self.settings
         self.vent()
-        return watch_closed(self.guard, LeakTest(wanted.fill, wanted.settle, wanted.rest, wanted.rest_step))
+        test = LeakTest(wanted.fill, wanted.settle, wanted.rest, wanted.rest_step)
+        return watch_closed(self.guard, test, self.tell)
 
     def again(self, joint: int, muscle: int) -> Trace:
         """Fill a muscle from vented; then vent it."""
@@ -326,7 +350,7 @@ class _Bench:
     def _still(self, joint: int) -> Reading:
         """Return the mean of the readings once the arm stands still."""
         self.watch(self.valves(joint, 0, 0), self.settings.sweep_settle, self.settings.rest_step)
-        last = self.watch(self.valves(joint, 0, 0), 0.1)
+        last = self.watch(self.valves(joint, 0, 0), _STILL)
         angle = np.median([r.angle for r in last], axis=0)
         return Reading(last[-1].time, angle, np.mean([r.pressure for r in last], axis=0))
 

@@ -5,18 +5,23 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
 from pneumarm.appendix_a.runs import RunsSettings
-from pneumarm.arm import Arm, ArmSpec, Reading, guarded, open_arm
+from pneumarm.arm import Arm, ArmSpec, GuardedArm, Reading, guarded, open_arm
 from pneumarm.arm.corrected import CorrectedArm
 from pneumarm.arm.seam import measured, unit_of
+from pneumarm.arm.serial import SerialArm
+from pneumarm.arm.serial.protocol import EXTRAS, JOINTS, MUSCLES
 from pneumarm.arm.spec_file import save_arm_file
+from pneumarm.arm.wrapper import unwrapped
 from pneumarm.checkup import (
+    ArmCalibration,
     Checkup,
     CheckupSettings,
+    Complaint,
     Known,
     calibrate,
     diagnose,
@@ -24,7 +29,7 @@ from pneumarm.checkup import (
     measure,
 )
 from pneumarm.checkup.figures import JOINT_HEADER, MUSCLE_HEADER, joint_row, muscle_row
-from pneumarm.commands.asking import asked_for, missing_of
+from pneumarm.commands.asking import Person, asked_for, calibrated, missing_of, resting
 from pneumarm.commands.common import Json, Measuring, Settings
 from pneumarm.console import say, show, table
 from pneumarm.errors import ArmUnsound, UnusableInput
@@ -33,7 +38,8 @@ from pneumarm.progress import progress
 from pneumarm.transitions.window import QUANTITIES
 
 
-def _measured(opened: Arm, settings: CheckupSettings) -> Checkup:
+def measured_arm(opened: Arm, settings: CheckupSettings) -> Checkup:
+    """Return what a check-up of ``opened`` measures, with progress."""
     with progress("checking") as report:
         return measure(opened, settings, progress=report)
 
@@ -49,6 +55,8 @@ def check_(
     json: Json = False,
 ) -> None:
     """Move an arm gently, a muscle at a time, and say what is wrong with it. Its joints must be free to move.
+
+    It takes about two minutes of the arm's time, and half a minute more for each further joint.
 
     The exit code is 0 whatever it finds, because the check was done; with ``--strict`` it is 1 if anything is wrong.
 
@@ -67,7 +75,7 @@ def check_(
     if out is not None:
         require_output(out)
     with open_arm(arm, seed) as opened:
-        checkup = _measured(opened, settings)
+        checkup = measured_arm(opened, settings)
     sound = None
     if isinstance(opened, CorrectedArm):
         sound = opened.known.sound
@@ -164,23 +172,36 @@ def calibrate_(
     with open_arm(arm, seed) as opened:
         if isinstance(opened, CorrectedArm) and not opened.known.correction.is_none:
             raise UnusableInput(f"{arm} is calibrated already; leave spec= out, or give a spec without corrections")
-        checkup = _measured(opened, settings)
+        checkup = measured_arm(opened, settings)
         findings = diagnose(checkup)
-        blocking = [finding for finding in findings if finding.kind not in _NO_HINDRANCE]
-        if blocking:
+        if blocking := to_mend(findings):
             raise UnusableInput(f"{arm}: mend it before you calibrate it. {' '.join(map(str, blocking))}")
         for finding in findings:
             say(str(finding))
         if missing:
-            known = asked_for(guarded(opened), checkup, known)
-    calibration = calibrate(checkup, known)
+            guard, person = guarded(opened), Person()
+            known = asked_for(guard, checkup, known, person)
+            calibration, known = calibrated(checkup, known, person, resting(guard))
+        else:
+            calibration = calibrate(checkup, known)
     save_arm_file(calibration.file, out)
+    told_of(calibration, known)
     result = {
         "spec": asdict(calibration.file.spec),
         "correction": asdict(calibration.file.correction),
         "linearised_residual_degrees": list(calibration.residual),
         "sound": None if calibration.file.sound is None else asdict(calibration.file.sound),
     }
+    rows = [
+        (name.replace("_", " "), value)
+        for name, value in asdict(calibration.file.spec).items()
+        if value not in (None, ())
+    ]
+    show(result, json, lambda: [table((str(out), ""), rows)])
+
+
+def told_of(calibration: ArmCalibration, known: Known) -> None:
+    """Say what a calibration by what was ``known`` has found."""
     spec = calibration.file.spec
     sources = ("by data sheet", "by protractor", "by manometer", "as it was")
     angle = sources[0 if known.counts_per_degree else 1 if known.angles else 3]
@@ -190,8 +211,11 @@ def calibrate_(
     for j, residual in enumerate(calibration.residual):
         if residual is not None:
             say(f"joint {j + 1}: the potentiometer is not linear; linearised off by {residual:.2f} degrees (rms)")
-    rows = [(name.replace("_", " "), value) for name, value in asdict(spec).items() if value not in (None, ())]
-    show(result, json, lambda: [table((str(out), ""), rows)])
+
+
+def to_mend(findings: Sequence[Complaint]) -> list[Complaint]:
+    """Return which of the ``findings`` of a check-up have to be mended before an arm can be calibrated."""
+    return [finding for finding in findings if finding.kind not in _NO_HINDRANCE]
 
 
 _NO_HINDRANCE = ("angle logarithmic", "low supply", "rising supply", "leak", "noise", "noise not white", "jitter")
@@ -258,6 +282,7 @@ def sensors_(arm: str, /, *, seconds: float = 60.0, every: float = 0.2, json: Js
     seen: list[Reading] = []
     with open_arm(arm) as opened, suppress(KeyboardInterrupt):
         guard, spec = guarded(opened), opened.spec
+        say_board(opened)
         guard.set_valves(np.zeros_like(guard.applied))
         begin = guard.read().time
         while (reading := guard.read()).time < begin + seconds:
@@ -268,6 +293,22 @@ def sensors_(arm: str, /, *, seconds: float = 60.0, every: float = 0.2, json: Js
     rows = _extremes(seen, spec) if seen else []
     header = ("joint", "sensor", "unit", "lowest", "highest")
     show({"sensors": rows}, json, lambda: [table(header, [list(row.values()) for row in rows])])
+
+
+def say_board(opened: Arm) -> None:
+    """Say what the board of an arm has, and what of it is in use; nothing of an arm without a board."""
+    if unwrapped(opened, SerialArm) is None:
+        return
+    spec = opened.spec
+    sensors = spec.joints * (1 + (spec.muscles if spec.pressure_sensors else 0))
+    more = f" and {len(spec.sensors)} of {EXTRAS} extra channels" if spec.sensors else ""
+    other = (
+        "" if spec.joints == JOINTS else "; for both write joints = 2 in [spec] of arm.toml and add ,spec=arm.toml"
+    )
+    say(
+        f"In use: {spec.joints} of the board's {JOINTS} joints, with {2 * spec.joints * spec.muscles} of its "
+        f"{2 * MUSCLES} valves and {sensors} of its {JOINTS + MUSCLES} sensors{more}{other}."
+    )
 
 
 def _extremes(seen: Sequence[Reading], spec: ArmSpec) -> list[dict[str, Any]]:
@@ -291,7 +332,7 @@ def _sensed(reading: Reading, spec: ArmSpec) -> str:
     muscles = range(2 if spec.pressure_sensors else 0)
     joints = [
         f"joint {j + 1}: {degrees[j]:z6.1f}° ({reading.angle[j]:4.0f})"
-        + "".join(f"  {bar[j, m]:5.2f} bar ({reading.pressure[j, m]:4.0f})" for m in muscles)
+        + "".join(f"  {bar[j, m]:z5.2f} bar ({reading.pressure[j, m]:4.0f})" for m in muscles)
         for j in range(spec.joints)
     ]
     further = zip(spec.further, measured(reading, spec.further), strict=True)
@@ -302,6 +343,8 @@ def _sensed(reading: Reading, spec: ArmSpec) -> str:
 
 def valves_(arm: str, /, *, open_for: float = 0.3, pause: float = 1.0, json: Json = False) -> None:
     """Click every valve, one by one, and name it: with the air off, to check by eye and ear that all are wired right.
+
+    The guard permits a valve to open or keeps it closed at a limit. Whether it did open only you can hear.
 
     Parameters
     ----------
@@ -317,20 +360,48 @@ def valves_(arm: str, /, *, open_for: float = 0.3, pause: float = 1.0, json: Jso
     clicked = []
     with open_arm(arm) as opened:
         guard = guarded(opened)
-        closed = np.zeros_like(guard.applied)
+        say_board(opened)
+        guard.set_valves(np.zeros_like(guard.applied))
         guard.read()
-        for joint, muscle in np.ndindex(closed.shape):
-            for value, name in ((1, "inlet"), (-1, "exhaust")):
-                where = f"joint {joint + 1}, muscle {muscle + 1}, {name}"
-                say(where)
-                wanted = closed.copy()
-                wanted[joint, muscle] = value
-                guard.set_valves(wanted)
-                guard.wait(open_for)
-                clicked.append({"valve": where, "opened": bool((guard.applied == wanted).all())})
-                guard.set_valves(closed)
-                guard.wait(pause)
-    show({"clicked": clicked}, json, lambda: [table(("valve", "opened"), [list(c.values()) for c in clicked])])
+        for valve in valves_of(opened.spec):
+            say(str(valve))
+            clicked.append({"valve": str(valve), "permitted": click(guard, valve, open_for)})
+            guard.wait(pause)
+    show(
+        {"clicked": clicked},
+        json,
+        lambda: [table(("valve", "the guard permits it"), [[*c.values()] for c in clicked])],
+    )
+
+
+class Valve(NamedTuple):
+    """A valve of an arm; numbers are from 0."""
+
+    joint: int
+    muscle: int
+    value: int
+    """+1 for the inlet, -1 for the exhaust."""
+
+    def __str__(self) -> str:
+        kind = "inlet" if self.value > 0 else "exhaust"
+        return f"joint {self.joint + 1}, muscle {self.muscle + 1}, {kind}"
+
+
+def valves_of(spec: ArmSpec) -> list[Valve]:
+    """Return all valves of an arm, in the order in which they click."""
+    return [Valve(j, m, value) for j in range(spec.joints) for m in range(spec.muscles) for value in (1, -1)]
+
+
+def click(guard: GuardedArm, valve: Valve, open_for: float) -> bool:
+    """Open a ``valve`` for so long [s] and close it, all others closed; return whether the guard let it be opened."""
+    closed = np.zeros_like(guard.applied)
+    wanted = closed.copy()
+    wanted[valve.joint, valve.muscle] = valve.value
+    guard.set_valves(wanted)
+    guard.wait(open_for)
+    allowed = bool((guard.applied == wanted).all())
+    guard.set_valves(closed)
+    return allowed
 
 
 def emulate_(arm: str, /, *, link: Path | None = None, seed: int = 0, json: Json = False) -> None:

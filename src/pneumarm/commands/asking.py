@@ -1,16 +1,119 @@
 """What only a person can know of an arm, asked for while the arm is held still."""
 
 import math
-import select
+import os
 import sys
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
+from functools import partial
+from queue import Empty, Queue
+from threading import Thread
+
+import numpy as np
 
 from pneumarm.arm import GuardedArm
-from pneumarm.checkup import Checkup, Known, ends, fill_alone
+from pneumarm.checkup import ArmCalibration, Checkup, Known, calibrate, ends, fill_alone
 from pneumarm.console import say
 from pneumarm.errors import UnusableInput
 
+SUPPLY = (0.1, 10.0)
+"""Pressures that a supply can have [bar gauge]."""
+PER_BAR = (1.0, 1000.0)
+"""Counts of a pressure sensor per bar that are possible."""
 _TURN = 0.05  # s between two looks at the keyboard
+_HELD = 60.0  # s for which a muscle is kept full while nobody answers
+_TURNED = (-360.0, 360.0)  # degrees that a protractor can show
+
+
+class Person:
+    """Who answers on standard input, a line each; what an arm needs meanwhile is done until then."""
+
+    def __init__(self) -> None:
+        self._lines: Queue[str | None] = Queue()
+        Thread(target=self._read, args=(sys.stdin.fileno(),), name="pneumarm answers", daemon=True).start()
+
+    def _read(self, descriptor: int) -> None:
+        """Put what is typed into the queue; in the end None."""
+        rest = b""
+        with suppress(OSError):  # a terminal that was closed
+            while data := os.read(descriptor, 4096):
+                *lines, rest = (rest + data).split(b"\n")
+                for line in lines:
+                    self._lines.put(line.decode(errors="replace").strip())
+        if rest:
+            self._lines.put(rest.decode(errors="replace").strip())
+        self._lines.put(None)
+
+    def line(self, question: str, meanwhile: Callable[[], object] = lambda: None) -> str:
+        """Return the answer to ``question``; ``meanwhile`` is called over and over until it is there.
+
+        On a terminal what was typed before the question is no answer to it.
+
+        Raises:
+            UnusableInput: nobody will answer any more.
+
+        """
+        while sys.stdin.isatty() and not self._lines.empty():
+            self._lines.get()
+        say(question)
+        while True:
+            meanwhile()
+            with suppress(Empty):
+                answer = self._lines.get(timeout=_TURN)
+                break
+        if answer is None:
+            self._lines.put(None)
+            raise UnusableInput("no answer came; call the command again at a terminal, or give options instead")
+        return answer
+
+    def number(
+        self,
+        question: str,
+        between: tuple[float, float],
+        meanwhile: Callable[[], object] = lambda: None,
+        usual: float | None = None,
+    ) -> float:
+        """Return the number answered, asked for again until it is ``between`` two; ``usual`` for an empty line."""
+        low, high = between
+        while True:
+            answer = self.line(question, meanwhile)
+            if not answer and usual is not None:
+                return usual
+            value = as_number(answer)
+            if low <= value <= high:
+                return value
+            what = "is not a number" if math.isnan(value) else "is not possible"
+            say(f"{answer!r} {what}: a number from {low:g} to {high:g} is needed.")
+
+    def choice(self, question: str, choices: Sequence[str], meanwhile: Callable[[], object] = lambda: None) -> str:
+        """Return which of ``choices`` was answered, whole or by its first letter; it is asked again until one was."""
+        told = ", ".join(f"{word[0]} = {word}" for word in choices)
+        while True:
+            answer = self.line(f"{question} ({told})", meanwhile).lower()
+            found = [word for word in choices if answer in (word[0], word)]
+            if found:
+                return found[0]
+            say(f"{answer!r} is none of these.")
+
+
+def as_number(answer: str) -> float:
+    """Return the number in ``answer``, with a point or a comma; NaN where it is none."""
+    try:
+        value = float(answer.replace(",", "."))
+    except ValueError:
+        return math.nan
+    return value if math.isfinite(value) else math.nan
+
+
+def resting(guard: GuardedArm) -> Callable[[], None]:
+    """Return what is to be called over and over while an arm stands still: hardware knows by it that we are there."""
+    return lambda: guard.despite_losses(lambda: guard.wait(0.0))
+
+
+def vent(guard: GuardedArm) -> None:
+    """Open all exhausts."""
+    guard.despite_losses(lambda: guard.set_valves(np.full_like(guard.applied, -1)))
 
 
 def missing_of(arm: str, known: Known) -> list[str]:
@@ -22,44 +125,94 @@ def missing_of(arm: str, known: Known) -> list[str]:
     return angle + pressure
 
 
-def asked_for(guard: GuardedArm, checkup: Checkup, known: Known) -> Known:
-    """Return what is known with what a person says who has protractor and manometer before them."""
-    if not (known.angles or known.counts_per_degree):
-        known = replace(known, angles=tuple(_protractor(guard, checkup, j) for j in range(guard.spec.joints)))
+def asked_for(
+    guard: GuardedArm,
+    checkup: Checkup,
+    known: Known,
+    person: Person,
+    keep: Callable[[Known], object] = lambda known: None,
+) -> Known:
+    """Return what is known with what a person says who has protractor and manometer before them.
+
+    What is known of the angles of some joints is for the first ones; ``keep`` is called after each answer.
+    """
+    if not known.counts_per_degree:
+        for joint in range(len(known.angles), guard.spec.joints):
+            known = replace(known, angles=(*known.angles, _protractor(guard, checkup, joint, person)))
+            keep(known)
+    vent(guard)
     if not (known.supply or known.counts_per_bar):
-        known = replace(known, supply=_answer(guard, "What does the manometer of the supply show [bar]?"))
+        question = "What does the manometer of the supply show [bar]?"
+        known = replace(known, supply=person.number(question, SUPPLY, resting(guard)))
+        keep(known)
     return known
 
 
-def _protractor(guard: GuardedArm, checkup: Checkup, joint: int) -> tuple[float, float]:
+def calibrated(
+    checkup: Checkup, known: Known, person: Person, meanwhile: Callable[[], object]
+) -> tuple[ArmCalibration, Known]:
+    """Return the calibration by what is ``known``, and that; where pressures tell nothing, their scale is asked for.
+
+    Raises:
+        UnusableInput: something has to be mended, and the arm to be checked again.
+
+    """
+    while True:
+        try:
+            return calibrate(checkup, known), known
+        except UnusableInput as error:
+            if known.supply is None:
+                raise
+            say(f"{error}. What was measured is kept.")
+            question = "Counts per bar of the pressure sensors, by their data sheet? (Enter if it has to be mended)"
+            per_bar = person.number(question, PER_BAR, meanwhile, usual=0.0)
+            if not per_bar:
+                raise
+            known = replace(known, supply=None, counts_per_bar=per_bar)
+
+
+def _protractor(guard: GuardedArm, checkup: Checkup, joint: int, person: Person) -> tuple[float, float]:
     """Return the angles [degrees] of ``joint`` at the ends of the check-up, from those that it is held at now."""
-    said, counts = [], []
-    for muscle in (1, 0):
-        fill_alone(guard, joint, muscle, checkup.settings)
-        question = f"Joint {joint + 1} stands with muscle {muscle + 1} full. Its angle by the protractor [degrees]?"
-        said.append(_answer(guard, question))
-        counts.append(float(guard.read().angle[joint]))
-    if not (said[0] < said[1] and counts[0] < counts[1]):
-        raise UnusableInput(f"{guard.spec.name}: muscle 1 must turn the joint to the higher angle, got {said}")
+    while True:
+        at_end = [guard.despite_losses(partial(_at_end, guard, checkup, joint, m, person)) for m in (1, 0)]
+        said, counts = zip(*at_end, strict=True)
+        if said[0] < said[1] and counts[0] < counts[1]:
+            break
+        say(
+            f"That is not possible: muscle 1 turns joint {joint + 1} to the higher angle, but you said {said[1]:g} "
+            f"degrees for muscle 1 and {said[0]:g} for muscle 2. Both are asked for again."
+        )
     per_degree = (counts[1] - counts[0]) / (said[1] - said[0])
     then = ends(checkup.joints[joint])  # it has crept a little since
     low, high = (s + (float(t) - c) / per_degree for s, t, c in zip(said, then, counts, strict=True))
     return low, high
 
 
-def _answer(guard: GuardedArm, question: str) -> float:
-    """Return the number that a person answers; meanwhile the arm stays as it is."""
+def _at_end(guard: GuardedArm, checkup: Checkup, joint: int, muscle: int, person: Person) -> tuple[float, float]:
+    """Hold ``joint`` with one muscle full and return its angle by the protractor [degrees], and its counts then.
+
+    After a minute without an answer the air is let out; an empty line has it filled again.
+    """
+    question = (
+        f"Joint {joint + 1} stands with muscle {muscle + 1} full. Its angle by the protractor [degrees]? (Enter "
+        "moves it there again)"
+    )
     while True:
-        say(question)
-        while not select.select([sys.stdin], [], [], 0.0)[0]:
-            guard.wait(_TURN)
-        line = sys.stdin.readline()
-        if not line:
-            raise UnusableInput("no answer came; give --angles and --supply instead")
-        try:
-            value = float(line.replace(",", "."))
-        except ValueError:
-            value = float("nan")
-        if math.isfinite(value):
-            return value
-        say(f"{line.strip()!r} is not a number.")
+        fill_alone(guard, joint, muscle, checkup.settings)
+        begun, counts, vented = guard.read().time, math.nan, False
+
+        def hold(begun: float = begun) -> None:
+            nonlocal counts, vented
+            guard.wait(0.0)
+            if vented:
+                return
+            reading = guard.read()
+            counts = float(reading.angle[joint])
+            if reading.time - begun > _HELD:
+                guard.set_valves(np.full_like(guard.applied, -1))
+                vented = True
+                say("The air is let out meanwhile.")
+
+        angle = person.number(question, _TURNED, hold, usual=math.inf)
+        if math.isfinite(angle):
+            return angle, counts

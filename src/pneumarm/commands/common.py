@@ -86,7 +86,7 @@ def live(spec: ArmSpec) -> Iterator[Seen]:
                 return
             shown = now
             joints = zip(spec.degrees(reading.angle), spec.degrees(goal), spec.bar(reading.pressure), strict=True)
-            angles = [f"{at:z6.1f}° of {to:z6.1f}°  {p[0]:.2f} {p[1]:.2f} bar" for at, to, p in joints]
+            angles = [f"{at:z6.1f}° of {to:z6.1f}°  {p[0]:z.2f} {p[1]:z.2f} bar" for at, to, p in joints]
             status.update(f"{reading.time:8.1f} s  {'   '.join(angles)}")
 
         yield see

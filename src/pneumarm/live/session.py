@@ -23,6 +23,7 @@ from pneumarm.arm.seam import Reading
 from pneumarm.arm.serial.arm import SerialArm
 from pneumarm.arm.valves import Command
 from pneumarm.arm.virtual import VirtualArm
+from pneumarm.arm.wrapper import unwrapped
 from pneumarm.control import Monitor
 from pneumarm.control.monitor.findings import Finding
 from pneumarm.errors import PneumarmError, UnusableInput
@@ -32,7 +33,6 @@ from pneumarm.live.figures import PlayFigures
 from pneumarm.live.hand import Dragged, curve_reference
 from pneumarm.live.lease import HOLD_AFTER, VENT_AFTER
 from pneumarm.live.orders import Faults, FollowCurve, GoTo, Hold, Order, Relax, Release, Stop
-from pneumarm.live.picture import unwrapped
 from pneumarm.live.screen import Screen
 from pneumarm.live.words import prevented, sentence
 from pneumarm.task.reference import counts_of
@@ -42,6 +42,7 @@ _MOST_ORDERS = 200  # that wait for the next turn; then the oldest is forgotten
 _FINDINGS = 6  # newest, that are told
 _TELL = 0.3  # s between two looks at how things stand
 _NAP = 0.05  # s between two looks of a loop that stands still
+_BLIND = ("dead-potentiometer", "frozen-potentiometer")  # findings after which nobody knows where a joint is
 _LOST = "holding: the controlling page lost its connection"
 
 
@@ -153,6 +154,7 @@ class Session:
             self._stop.clear()
             self._vent_all(Mode.STOPPED, "stopped by hand: everything is vented until somebody releases it")
         self._mind_silence()
+        self._mind_sensors()
         if self._leave.is_set():
             return None
         if self._mover is None or self.mode not in _ACTING:
@@ -194,6 +196,17 @@ class Session:
         elif self._why != _LOST:
             self._go(self._now)
             self._why = _LOST
+
+    @property
+    def _blind(self) -> list[int]:
+        """Joints, from 1, whose angle is not known, because its sensor is dead or frozen."""
+        return sorted({one.joint for one in self._watch.now if one.kind in _BLIND and one.joint is not None})
+
+    def _mind_sensors(self) -> None:
+        """Stop a moving arm that nobody knows the angle of."""
+        if self.mode in _ACTING and (blind := self._blind):
+            joints = " and ".join(map(str, blind))
+            self._vent_all(Mode.STOPPED, f"stopped: where joint {joints} is, nobody knows; see to its angle sensor")
 
     # ---- orders
 
@@ -328,6 +341,7 @@ class Session:
             familiar=self._watch.familiar,
             guard=prevented(self.arm.interventions),
             missed=self._missed,
+            blind=self._blind,
             air=None if air is None else round(air, 2),
             faults=None if self._switches is None else self._switches.on,
         )

@@ -74,6 +74,11 @@ class SerialPort(Line):
             self._port.close()
 
 
+def boards() -> list[tuple[str, str]]:
+    """Return the path of each USB serial port, and what is there."""
+    return [(port.device, str(port.description)) for port in list_ports.comports() if port.vid is not None]
+
+
 def _usb_of(path: str) -> tuple[object, ...] | None:
     """Return by what the USB device at ``path`` is known again; None where nothing tells it from others."""
     for port in list_ports.comports():

@@ -223,6 +223,28 @@ def test_a_fault_is_switched_on_found_and_switched_off(played: Played) -> None:
     assert played.virtual.faults == ()
 
 
+def test_an_arm_whose_angle_nobody_knows_is_stopped_and_says_so(played: Played) -> None:
+    goals = [(1.0 + k, GoTo([15.0 if k % 2 else -15.0])) for k in range(40)]
+    on, off = Faults("dead-potentiometer", 1, 0, True), Faults("dead-potentiometer", 1, 0, False)
+    blind: list[list[int]] = []
+    vented: list[list[list[int]]] = []
+    played.run(
+        *goals,
+        (25.05, on),
+        (30.0, lambda: blind.append(played.session._blind)),
+        (30.5, lambda: vented.append(played.arm.valves[-1].tolist())),
+        (31.0, off),
+        (36.0, Release()),
+        (37.0, lambda: blind.append(played.session._blind)),
+        until=40.0,
+    )
+    stopped = [why for time, mode, why in played.modes if mode == Mode.STOPPED]
+    assert stopped[0] == "stopped: where joint 1 is, nobody knows; see to its angle sensor"
+    assert vented == [VENTED]
+    assert blind == [[1], []]
+    assert played.modes[-1][1] == Mode.MOVING
+
+
 def test_what_cannot_be_done_is_said(played: Played) -> None:
     played.run((0.1, Faults("leak", 7, 1, True)), until=1.0)
     assert "joint 7" in played.screen.state["notice"]

@@ -5,9 +5,8 @@ from pathlib import Path
 
 from pneumarm.experiments.experiment import Experiment, LaboratorySettings
 from pneumarm.experiments.preparation import SIMULATION
+from pneumarm.transitions.collect import recording_seconds
 
-_RECORDING = (200 / 30 + 3.8) / 200
-"""A transition's share of the time of its sequence: 200 at 30 Hz after 3.8 s in which it is begun [s]."""
 _MOVEMENT = 5.5
 """A movement, with all that leads to its begin state [s]."""
 
@@ -26,7 +25,7 @@ def arm_time(
     parts = []
     if records:
         parts.append(f"{settings.transitions:,} transitions to record")
-        seconds += _RECORDING * settings.transitions
+        seconds += recording_seconds(settings.transitions)
     if movements:
         parts.append(f"at most {movements:,} movements")
     if not parts:

@@ -6,7 +6,7 @@ from pathlib import Path
 from threading import Event, Lock, Thread
 from typing import Any
 
-from pneumarm.arm import guarded, open_arm
+from pneumarm.arm import ArmSpec, guarded, open_arm
 from pneumarm.control.versions import HISTORY, TRAINED, put_back, read_history
 from pneumarm.errors import PneumarmError, UnusableInput
 from pneumarm.live.choices import Choice, Mover, choices_in, monitor_for, opened
@@ -20,6 +20,7 @@ from pneumarm.live.screen import Screen
 from pneumarm.live.session import Mode, Session
 from pneumarm.run import RunSettings, settings_in
 from pneumarm.simulation.enough import EnoughSettings
+from pneumarm.transitions.collect import recording_seconds
 
 
 class LiveArm:
@@ -144,9 +145,14 @@ class LiveArm:
             choices=[[one.name, one.version] for one in choices],
             in_use=self._in_use(),
             can_learn=self._can_learn(),
-            minutes=round((self.settings.transitions or 0) * spec.period / 60 or EnoughSettings().most_of(spec) / 60),
+            minutes=round(self._recording(spec) / 60),
         )
         return Session(guarded(paced), mover, watch, self.screen, lambda: self.lease.silence)
+
+    def _recording(self, spec: ArmSpec) -> float:
+        """Return about how long the arm is recorded when it learns [s]."""
+        wanted = self.settings.transitions
+        return EnoughSettings().most_of(spec) if wanted is None else recording_seconds(wanted, spec.period)
 
     def _choices(self) -> list[Choice]:
         return [*self._named, *(choices_in(self.folder) if self.folder is not None else [])]

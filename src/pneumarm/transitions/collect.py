@@ -85,6 +85,7 @@ class CollectBegin(BeginState):
 _USUAL_RATE = 30.0  # Hz; at higher ones as many seconds as there, at lower ones as many periods
 _LONGEST_PULSES = 4  # most periods in a row in which a muscle gets the same pulse
 _ACTIONS, _HELD = 200, 10  # of a sequence; most periods for which an action is held
+_BEGUN = 3.8  # s in which a sequence is begun, about
 _FULL, _EMPTY = 4 / 3, 4.0  # times of nine tenths of the way in which muscles are full or empty
 _SLOWEST = 4.0  # times of filling after which a joint is taken to be at its end, whatever it does
 _HARDLY = 0.03  # share of its way; a joint that moves less in half a time of filling is at its end
@@ -277,6 +278,14 @@ def collect(
             f"the {number} sequences before it are stored. Check the arm and run the same command again"
         ) from error
     return collection.result(wall_clock.perf_counter() - begun)
+
+
+def recording_seconds(transitions: int, period: float = 1 / _USUAL_RATE) -> float:
+    """Return about how long an arm controlled with this ``period`` [s] takes for so many transitions [s].
+
+    Its sequences begin at rest, and getting there takes more than half as long as they do.
+    """
+    return transitions * period * (1 + _BEGUN * _USUAL_RATE / _ACTIONS)
 
 
 def require_enough(transitions: int) -> None:

@@ -6,6 +6,7 @@ import { Movement, asDegrees, capital, finding, hint, lasted, learningNow } from
 
 const BEAT = 250; // ms between two signs of life: who controls the arm and is silent has it held, then vented
 const SENT = 33; // ms between two goals while one is dragged
+const FADED = 120; // s after which what was wrong and is over is shown no more
 const OLD = 1500; // ms after which what is shown is no longer what is
 
 const $ = (id) => document.getElementById(id);
@@ -93,6 +94,7 @@ function showFrame(now) {
 function showMode() {
   const old = performance.now() - seen > OLD, lost = state === null;
   document.body.classList.toggle("old", old || lost);
+  document.body.classList.toggle("blind", Boolean(state?.blind?.length)); // then the drawing tells nothing
   const words = lost ? "Not connected: this is how it was last seen" : movement.words(state, old);
   if ($("mode").textContent !== words) $("mode").textContent = words;
   const help = state ? hint(state, writes()) : "";
@@ -207,7 +209,7 @@ function showLearning(now) {
   $("learn").classList.toggle("over", !busy && Boolean(learning?.done)); // then there is more to look at
   $("begin").hidden = busy || !now.can_learn;
   $("begin").disabled = !writes();
-  $("begin").textContent = learning && !learning.done ? "Go on learning" : `Learn to move it: record ${now.minutes} min of its movement`;
+  $("begin").textContent = learning && !learning.done ? "Go on learning" : `Learn to move it: about ${now.minutes} min of the arm's time, then some of computing`;
   fill("stages", learning?.stages, () => (learning?.stages ?? []).map((stage) => {
     const line = document.createElement("li");
     line.className = stage.state;
@@ -226,8 +228,15 @@ function showHealth(now) {
   const lines = (now.wrong ?? []).map((one) => ["", finding(one, time)]);
   if (learns) lines.push(["over", "While it learns, what is noticed is written into the report."]);
   else if (!lines.length) lines.push(now.familiar ? ["fine", "Nothing unusual."] : ["over", "Nothing unusual so far. The monitor does not know this arm yet: it needs 20 s of movement."]);
-  lines.push(...(now.was_wrong ?? []).map((one) => ["over", finding(one, time)]));
-  fill("wrong", lines, () => lines.map(([kind, text]) => Object.assign(document.createElement("li"), { className: kind, textContent: text })));
+  for (const one of now.was_wrong ?? []) {
+    const left = 1 - (time - one[2]) / FADED;
+    if (left > 0) lines.push(["over", finding(one, time), 0.3 + 0.7 * left]);
+  }
+  fill("wrong", lines, () => lines.map(([kind, text, opacity = 1]) => {
+    const line = Object.assign(document.createElement("li"), { className: kind, textContent: text });
+    line.style.opacity = opacity;
+    return line;
+  }));
   const counts = learns ? {} : {
     "the guard": now.guard, "control periods missed": now.missed,
     "air used": now.air == null ? null : `${now.air.toFixed(2)} normal litres`,

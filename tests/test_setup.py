@@ -19,7 +19,7 @@ from pneumarm.arm import open_arm
 from pneumarm.arm.serial.emulate import serve
 from pneumarm.arm.spec_file import load_arm_file
 from pneumarm.arm.virtual.faults import Fault, StuckValve, SwappedMuscles, SwappedValves
-from pneumarm.commands import asking, setup_
+from pneumarm.commands import asking
 from setup_arms import HandArm
 from small import exit_status
 
@@ -46,8 +46,7 @@ class Answering:
         }
         out, self._in = os.pipe()
         monkeypatch.setattr(sys, "stdin", open(out))  # noqa: SIM115 - as long as the test
-        for module in (asking, setup_):
-            monkeypatch.setattr(module, "say", self.say)
+        monkeypatch.setattr(asking, "say", self.say)
         self.now = ""
 
     def turn(self) -> str:

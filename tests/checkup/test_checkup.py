@@ -522,7 +522,7 @@ def test_a_person_is_asked_while_the_arm_is_held(monkeypatch):
     monkeypatch.setattr(asking, "say", say)
     with open(slave) as terminal, guard:
         monkeypatch.setattr(sys, "stdin", terminal)
-        known = asking.asked_for(guard, checkup, Known(counts_per_bar=166.0), asking.Person(), kept.append)
+        known = asking.asked_for(guard, checkup, Known(counts_per_bar=166.0), asking.AtTerminal(), kept.append)
         arm.wait(2.0)
         assert arm.read().pressure.max() < 10  # nothing is kept full
     os.close(master)

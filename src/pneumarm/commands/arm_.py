@@ -1,7 +1,7 @@
 """``pneumarm arm check``, ``calibrate``, ``sensors``, ``valves``, ``errors``, ``emulate`` and ``flash``."""
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
@@ -29,18 +29,18 @@ from pneumarm.checkup import (
     measure,
 )
 from pneumarm.checkup.figures import JOINT_HEADER, MUSCLE_HEADER, joint_row, muscle_row
-from pneumarm.commands.asking import Person, asked_for, calibrated, missing_of, resting
+from pneumarm.commands.asking import AtTerminal, asked_for, calibrated, missing_of, resting
 from pneumarm.commands.common import Json, Measuring, Settings
 from pneumarm.console import say, show, table
 from pneumarm.errors import ArmUnsound, UnusableInput
 from pneumarm.files import make_folder, require_folder, require_output, write_text
-from pneumarm.progress import progress
+from pneumarm.progress import Display, progress
 from pneumarm.transitions.window import QUANTITIES
 
 
-def measured_arm(opened: Arm, settings: CheckupSettings) -> Checkup:
+def measured_arm(opened: Arm, settings: CheckupSettings, display: Display = progress) -> Checkup:
     """Return what a check-up of ``opened`` measures, with progress."""
-    with progress("checking") as report:
+    with display("checking") as report:
         return measure(opened, settings, progress=report)
 
 
@@ -179,13 +179,14 @@ def calibrate_(
         for finding in findings:
             say(str(finding))
         if missing:
-            guard, person = guarded(opened), Person()
+            guard, person = guarded(opened), AtTerminal()
             known = asked_for(guard, checkup, known, person)
             calibration, known = calibrated(checkup, known, person, resting(guard))
         else:
             calibration = calibrate(checkup, known)
     save_arm_file(calibration.file, out)
-    told_of(calibration, known)
+    for line in told_of(calibration, known):
+        say(line)
     result = {
         "spec": asdict(calibration.file.spec),
         "correction": asdict(calibration.file.correction),
@@ -200,17 +201,17 @@ def calibrate_(
     show(result, json, lambda: [table((str(out), ""), rows)])
 
 
-def told_of(calibration: ArmCalibration, known: Known) -> None:
-    """Say what a calibration by what was ``known`` has found."""
+def told_of(calibration: ArmCalibration, known: Known) -> Iterator[str]:
+    """Yield lines on what a calibration by what was ``known`` has found."""
     spec = calibration.file.spec
     sources = ("by data sheet", "by protractor", "by manometer", "as it was")
     angle = sources[0 if known.counts_per_degree else 1 if known.angles else 3]
     pressure = sources[0 if known.counts_per_bar else 2 if known.supply else 3]
-    say(f"angle: {spec.counts_per_degree:.3f} counts per degree, {angle}")
-    say(f"pressure: {spec.counts_per_bar:.1f} counts per bar, {pressure}")
+    yield f"angle: {spec.counts_per_degree:.3f} counts per degree, {angle}"
+    yield f"pressure: {spec.counts_per_bar:.1f} counts per bar, {pressure}"
     for j, residual in enumerate(calibration.residual):
         if residual is not None:
-            say(f"joint {j + 1}: the potentiometer is not linear; linearised off by {residual:.2f} degrees (rms)")
+            yield f"joint {j + 1}: the potentiometer is not linear; linearised off by {residual:.2f} degrees (rms)"
 
 
 def to_mend(findings: Sequence[Complaint]) -> list[Complaint]:

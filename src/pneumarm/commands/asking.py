@@ -3,6 +3,7 @@
 import math
 import os
 import sys
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -11,27 +12,115 @@ from queue import Empty, Queue
 from threading import Thread
 
 import numpy as np
+from rich.status import Status
 
 from pneumarm.arm import GuardedArm
 from pneumarm.checkup import ArmCalibration, Checkup, Known, calibrate, ends, fill_alone
-from pneumarm.console import say
+from pneumarm.console import ERRORS, say
 from pneumarm.errors import UnusableInput
+from pneumarm.progress import Display, progress
 
 SUPPLY = (0.1, 10.0)
 """Pressures that a supply can have [bar gauge]."""
 PER_BAR = (1.0, 1000.0)
 """Counts of a pressure sensor per bar that are possible."""
+_BAR = 24  # letters of a bar
 _TURN = 0.05  # s between two looks at the keyboard
 _HELD = 60.0  # s for which a muscle is kept full while nobody answers
 _TURNED = (-360.0, 360.0)  # degrees that a protractor can show
 
 
-class Person:
-    """Who answers on standard input, a line each; what an arm needs meanwhile is done until then."""
+Bars = Sequence[tuple[str, float, str]]
+"""Names, shares of their ranges, and values in words, of what is shown as bars."""
+
+
+class Person(ABC):
+    """Who is told and asked; what an arm needs meanwhile is done until the answer is there."""
+
+    display: Display = staticmethod(progress)
+    """Shows how far long work is."""
+
+    @abstractmethod
+    def say(self, text: str) -> None:
+        """Tell ``text``."""
+
+    @abstractmethod
+    def show(self, bars: Bars) -> None:
+        """Show what sensors read now; nothing where there are no ``bars``."""
+
+    @abstractmethod
+    def line(
+        self,
+        question: str,
+        meanwhile: Callable[[], object] = lambda: None,
+        *,
+        choices: Sequence[str] = (),
+        numbers: bool = False,
+    ) -> str:
+        """Return the answer to ``question``; ``meanwhile`` is called over and over until it is there.
+
+        Where there are ``choices`` or ``numbers`` are wanted, that is how it is asked; any answer may come all the
+        same.
+
+        Raises:
+            UnusableInput: nobody will answer any more.
+
+        """
+
+    def number(
+        self,
+        question: str,
+        between: tuple[float, float],
+        meanwhile: Callable[[], object] = lambda: None,
+        usual: float | None = None,
+    ) -> float:
+        """Return the number answered, asked for again until it is ``between`` two; ``usual`` for an empty line."""
+        low, high = between
+        while True:
+            answer = self.line(question, meanwhile, numbers=True)
+            if not answer and usual is not None:
+                return usual
+            value = as_number(answer)
+            if low <= value <= high:
+                return value
+            what = "is not a number" if math.isnan(value) else "is not possible"
+            self.say(f"{answer!r} {what}: a number from {low:g} to {high:g} is needed.")
+
+    def choice(self, question: str, choices: Sequence[str], meanwhile: Callable[[], object] = lambda: None) -> str:
+        """Return which of ``choices`` was answered, whole or by its first letter; it is asked again until one was."""
+        while True:
+            answer = self.line(question, meanwhile, choices=choices).lower()
+            found = [word for word in choices if answer in (word[0], word)]
+            if found:
+                return found[0]
+            self.say(f"{answer!r} is none of these.")
+
+
+class AtTerminal(Person):
+    """Who answers on standard input, a line each."""
 
     def __init__(self) -> None:
         self._lines: Queue[str | None] = Queue()
+        self._status: Status | None = None
         Thread(target=self._read, args=(sys.stdin.fileno(),), name="pneumarm answers", daemon=True).start()
+
+    def say(self, text: str) -> None:
+        """Print ``text``."""
+        say(text)
+
+    def show(self, bars: Bars) -> None:
+        """Show ``bars`` below the last line; nothing where that is no terminal."""
+        if not ERRORS.is_terminal:
+            return
+        if self._status is None and bars:
+            self._status = Status("", console=ERRORS)
+            self._status.start()
+        if self._status is not None:
+            drawn = (f"{name} {('█' * round(_BAR * share)).ljust(_BAR, '░')} {value}" for name, share, value in bars)
+            self._status.update("   ".join(drawn))
+        if self._status is not None and not bars:
+            self._status.stop()
+            self._status = None
 
     def _read(self, descriptor: int) -> None:
         """Put what is typed into the queue; in the end None."""
@@ -45,18 +134,19 @@ class Person:
             self._lines.put(rest.decode(errors="replace").strip())
         self._lines.put(None)
 
-    def line(self, question: str, meanwhile: Callable[[], object] = lambda: None) -> str:
-        """Return the answer to ``question``; ``meanwhile`` is called over and over until it is there.
-
-        On a terminal what was typed before the question is no answer to it.
-
-        Raises:
-            UnusableInput: nobody will answer any more.
-
-        """
+    def line(
+        self,
+        question: str,
+        meanwhile: Callable[[], object] = lambda: None,
+        *,
+        choices: Sequence[str] = (),
+        numbers: bool = False,
+    ) -> str:
+        """Return the line that is typed; on a terminal what was typed before the question is no answer to it."""
         while sys.stdin.isatty() and not self._lines.empty():
             self._lines.get()
-        say(question)
+        told = ", ".join(f"{word[0]} = {word}" for word in choices)
+        say(f"{question} ({told})" if choices else question)
         while True:
             meanwhile()
             with suppress(Empty):
@@ -66,35 +156,6 @@ class Person:
             self._lines.put(None)
             raise UnusableInput("no answer came; call the command again at a terminal, or give options instead")
         return answer
-
-    def number(
-        self,
-        question: str,
-        between: tuple[float, float],
-        meanwhile: Callable[[], object] = lambda: None,
-        usual: float | None = None,
-    ) -> float:
-        """Return the number answered, asked for again until it is ``between`` two; ``usual`` for an empty line."""
-        low, high = between
-        while True:
-            answer = self.line(question, meanwhile)
-            if not answer and usual is not None:
-                return usual
-            value = as_number(answer)
-            if low <= value <= high:
-                return value
-            what = "is not a number" if math.isnan(value) else "is not possible"
-            say(f"{answer!r} {what}: a number from {low:g} to {high:g} is needed.")
-
-    def choice(self, question: str, choices: Sequence[str], meanwhile: Callable[[], object] = lambda: None) -> str:
-        """Return which of ``choices`` was answered, whole or by its first letter; it is asked again until one was."""
-        told = ", ".join(f"{word[0]} = {word}" for word in choices)
-        while True:
-            answer = self.line(f"{question} ({told})", meanwhile).lower()
-            found = [word for word in choices if answer in (word[0], word)]
-            if found:
-                return found[0]
-            say(f"{answer!r} is none of these.")
 
 
 def as_number(answer: str) -> float:
@@ -163,7 +224,7 @@ def calibrated(
         except UnusableInput as error:
             if known.supply is None:
                 raise
-            say(f"{error}. What was measured is kept.")
+            person.say(f"{error}. What was measured is kept.")
             question = "Counts per bar of the pressure sensors, by their data sheet? (Enter if it has to be mended)"
             per_bar = person.number(question, PER_BAR, meanwhile, usual=0.0)
             if not per_bar:
@@ -178,7 +239,7 @@ def _protractor(guard: GuardedArm, checkup: Checkup, joint: int, person: Person)
         said, counts = zip(*at_end, strict=True)
         if said[0] < said[1] and counts[0] < counts[1]:
             break
-        say(
+        person.say(
             f"That is not possible: muscle 1 turns joint {joint + 1} to the higher angle, but you said {said[1]:g} "
             f"degrees for muscle 1 and {said[0]:g} for muscle 2. Both are asked for again."
         )
@@ -211,7 +272,7 @@ def _at_end(guard: GuardedArm, checkup: Checkup, joint: int, muscle: int, person
             if reading.time - begun > _HELD:
                 guard.set_valves(np.full_like(guard.applied, -1))
                 vented = True
-                say("The air is let out meanwhile.")
+                person.say("The air is let out meanwhile.")
 
         angle = person.number(question, _TURNED, hold, usual=math.inf)
         if math.isfinite(angle):

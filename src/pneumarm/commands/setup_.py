@@ -1,6 +1,5 @@
 """``pneumarm setup``: the first day of an arm, from a blank board to an agent, by questions and answers."""
 
-from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
@@ -8,7 +7,6 @@ from typing import Annotated
 import numpy as np
 from cyclopts import Parameter
 from numpy.typing import NDArray
-from rich.status import Status
 
 from pneumarm.arm import ArmSpec, GuardedArm, Reading, guarded, open_arm
 from pneumarm.arm.serial.flash import flash
@@ -17,10 +15,10 @@ from pneumarm.arm.serial.protocol import JOINTS
 from pneumarm.arm.spec_file import Answers, ArmFile, load_arm_file, save_arm_file
 from pneumarm.checkup import Checkup, CheckupSettings, Known, diagnose
 from pneumarm.commands.arm_ import Valve, click, measured_arm, to_mend, told_of, valves_of
-from pneumarm.commands.asking import SUPPLY, Person, asked_for, calibrated, resting, vent
+from pneumarm.commands.asking import SUPPLY, AtTerminal, Bars, Person, asked_for, calibrated, resting, vent
 from pneumarm.commands.common import Json, Measuring
 from pneumarm.commands.run_ import run_
-from pneumarm.console import ERRORS, say
+from pneumarm.console import say
 from pneumarm.errors import ArmFailure, UnusableInput
 from pneumarm.files import require_folder
 from pneumarm.run import RunSettings
@@ -30,7 +28,6 @@ _FILL = 3.0  # s after which a muscle has the supply's pressure
 _COUNTED = 5  # s counted down before anything moves
 _LEAST_TURN = 0.05  # of the sensor's range: a joint that is turned by hand from end to end turns more
 _ELECTRICAL = (30.0, 3600.0)  # degrees that potentiometers turn
-_BAR = 24  # letters of a bar on a terminal
 _FIRST_PIN = 4  # of the board: D4 is the first inlet, D5 its exhaust, and so on (firmware/PROTOCOL.md)
 _ANGLE_PINS = ("A0", "A3")
 
@@ -63,7 +60,7 @@ def setup_(
         Random seed of a virtual arm's noise.
     """
     require_folder(out)
-    person = Person()
+    person = AtTerminal()
     name = arm or _found(person)
     if ",spec=" in name:
         raise UnusableInput(f"{name}: leave out spec=; {out} is written here, and read if it is there")
@@ -90,7 +87,7 @@ def _found(person: Person) -> str:
             "no board is at any USB port; plug it in, or name another arm: pneumarm setup serial:PORT"
         )
     for number, (path, what) in enumerate(found, 1):
-        say(f"{number}: {path} ({what})")
+        person.say(f"{number}: {path} ({what})")
     number = 1 if len(found) == 1 else round(person.number("Which is the arm's board?", (1, len(found))))
     return f"serial:{found[number - 1][0]}"
 
@@ -107,7 +104,7 @@ class _FirstDay:
         self.file: ArmFile | None = None
         if out.exists():
             self.file = load_arm_file(out)
-            say(f"{out} is there already: going on with what it says.")
+            person.say(f"{out} is there already: going on with what it says.")
 
     @property
     def calibrated_name(self) -> str:
@@ -142,12 +139,12 @@ class _FirstDay:
                 open_arm(self.name, self.seed).close()
                 break
             except (ArmFailure, UnusableInput) as error:
-                say(str(error))
+                self.person.say(str(error))
             question = "Flash pneumarm's firmware onto this board now? The air must be off."
             if self.person.choice(question, ("yes", "no")) == "no":
                 raise UnusableInput(f"{self.name}: nothing goes on without pneumarm's firmware on the board")
             flash(path)
-        say(f"The board at {path} answers.")
+        self.person.say(f"The board at {path} answers.")
 
     # ---- what it is
 
@@ -182,7 +179,9 @@ class _FirstDay:
             return replace(spec, pressure_sensors=True), answers
         question = "Then nothing but the supply limits the pressure. Can its highest pressure burst a muscle?"
         while self.person.choice(question, ("yes", "no")) == "yes":
-            say("Turn the reducer down, and put a relief valve behind it that opens before a muscle bursts.")
+            self.person.say(
+                "Turn the reducer down, and put a relief valve behind it that opens before a muscle bursts."
+            )
         return replace(spec, pressure_sensors=False, safe_supply=True), answers
 
     def _ask_highest(self, spec: ArmSpec, answers: Answers) -> tuple[ArmSpec, Answers]:
@@ -228,7 +227,7 @@ class _FirstDay:
             number = {"yes": number + 1, "back": max(number - 1, 0)}.get(answer, number)
             self._note(valves=number)
             if answer == "no":
-                say(
+                self.person.say(
                     f"Its pin is D{_pin(valve)}. Check the wire from there to the MOSFET, the valve's plug and its "
                     "power. If another valve clicked, swap the wires of the two."
                 )
@@ -244,7 +243,7 @@ class _FirstDay:
                 ends.append(self._read_while_asking(guard, question))
             wrong = _wrong_with(guard.spec, joint, *ends)
             if wrong is not None:
-                say(wrong)
+                self.person.say(wrong)
                 question = "Mend that and turn the joint again, or go on as it is?"
                 if self.person.choice(question, ("again", "go on"), resting(guard)) == "again":
                     continue
@@ -253,17 +252,16 @@ class _FirstDay:
 
     def _read_while_asking(self, guard: GuardedArm, question: str) -> NDArray[np.float64]:
         """Return the angles (joints,) [counts] when ``question`` is answered; a terminal shows them as bars."""
-        with Status("", console=ERRORS) if ERRORS.is_terminal else nullcontext() as status:
 
-            def look() -> Reading:
-                guard.despite_losses(lambda: guard.wait(0.0))
-                reading = guard.despite_losses(guard.read)
-                if status is not None:
-                    status.update(_bars(guard.spec, reading))
-                return reading
+        def look() -> Reading:
+            guard.despite_losses(lambda: guard.wait(0.0))
+            reading = guard.despite_losses(guard.read)
+            self.person.show(_bars(guard.spec, reading))
+            return reading
 
-            self.person.line(question, look)
-            return look().angle
+        self.person.line(question, look)
+        self.person.show(())
+        return guard.despite_losses(guard.read).angle
 
     # ---- the calibrated arm
 
@@ -278,7 +276,7 @@ class _FirstDay:
                 done = self._calibrated(guarded(opened))
         self.file = done
         save_arm_file(done, self.out)
-        say(f"{self.out}: the arm is calibrated.")
+        self.person.say(f"{self.out}: the arm is calibrated.")
 
     def _calibrated(self, guard: GuardedArm) -> ArmFile:
         assert self.answers is not None
@@ -290,9 +288,10 @@ class _FirstDay:
                     known = asked_for(guard, checkup, known, self.person, lambda now: self._note(angles=now.angles))
                 calibration, by = calibrated(checkup, known, self.person, resting(guard))
             except UnusableInput as error:
-                say(f"{error}.")
+                self.person.say(f"{error}.")
                 continue
-            told_of(calibration, by)
+            for line in told_of(calibration, by):
+                self.person.say(line)
             return calibration.file
 
     def _sound(self, guard: GuardedArm) -> Checkup:
@@ -301,20 +300,20 @@ class _FirstDay:
         at = f" at {self.answers.supply:g} bar" if self.answers.supply else ""
         while True:
             self._stand_clear(guard, f"Turn the air on{at}. The arm is checked for two minutes, muscle by muscle.")
-            checkup = measured_arm(guard, self.settings)
+            checkup = measured_arm(guard, self.settings, self.person.display)
             findings = diagnose(checkup)
             for finding in findings:
-                say(str(finding))
+                self.person.say(str(finding))
             if not to_mend(findings):
                 return checkup
-            say("Turn the air off and mend that; then it is checked again.")
+            self.person.say("Turn the air off and mend that; then it is checked again.")
 
     def _stand_clear(self, guard: GuardedArm, what: str) -> None:
         """Say ``what`` comes, wait until nobody is near the arm, and count down, with everything vented."""
         vent(guard)
         self.person.line(f"{what} Stand clear of the arm and press Enter.", resting(guard))
         for left in range(_COUNTED, 0, -1):
-            say(f"Stand clear: the arm moves in {left} s. Ctrl-C stops it.")
+            self.person.say(f"Stand clear: the arm moves in {left} s. Ctrl-C stops it.")
             guard.despite_losses(lambda: guard.wait(1.0))
 
     def learn(self, folder: Path, settings: RunSettings, json: bool) -> None:
@@ -362,11 +361,8 @@ def _wrong_with(spec: ArmSpec, joint: int, first: NDArray[np.float64], second: N
     )
 
 
-def _bars(spec: ArmSpec, reading: Reading) -> str:
-    """Return where each angle is in the range of its sensor, as bars."""
+def _bars(spec: ArmSpec, reading: Reading) -> Bars:
+    """Return where each angle is in the range of its sensor."""
     low, high = spec.angle_range
-    shares = np.clip((reading.angle - low) / (high - low), 0.0, 1.0)
-    bars = [("█" * round(_BAR * share)).ljust(_BAR, "░") for share in shares]
-    return "   ".join(
-        f"joint {j} {bar} {at:4.0f}" for j, (bar, at) in enumerate(zip(bars, reading.angle, strict=True), 1)
-    )
+    shares = np.clip((reading.angle - low) / (high - low), 0.0, 1.0).tolist()
+    return [(f"joint {j + 1}", shares[j], f"{at:4.0f}") for j, at in enumerate(reading.angle)]

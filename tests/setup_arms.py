@@ -43,3 +43,8 @@ def begin(arm: HandArm) -> None:
 def mine() -> HandArm:
     """Return the arm, for ``python:setup_arms:mine``."""
     return _arm[0]
+
+
+def sound() -> HandArm:
+    """Return an arm that nobody turns by hand, for ``python:setup_arms:sound`` in another process."""
+    return HandArm()

@@ -39,6 +39,7 @@ GUARDED = {
     "checkup/measure.py": "takes a GuardedArm",
     "classical/calibration.py": "takes a GuardedArm",
     "commands/arm_.py": "guards its arm",
+    "commands/asking.py": "takes a GuardedArm",
 }
 """Files that may set valves, and why."""
 

@@ -14,7 +14,7 @@ from pneumarm.live.server import LiveServer
 from pneumarm.progress import progress
 from pneumarm.run import SETTINGS, RunSettings, settings_in
 
-_LOCAL = ("127.0.0.1", "localhost", "::1")
+LOCAL = ("127.0.0.1", "localhost", "::1")
 _RUN = Path("pneumarm-run")
 
 
@@ -70,7 +70,7 @@ def live_(
         transfer=TRANSFER,
     )
     if not token:
-        token = None if host in _LOCAL else secrets.token_urlsafe(12)
+        token = None if host in LOCAL else secrets.token_urlsafe(12)
     with progress(f"opening {settings.arm}"):
         live_arm = LiveArm(settings, named, folder, method)
     server = LiveServer(live_arm, host, port, token)

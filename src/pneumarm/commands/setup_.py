@@ -1,5 +1,7 @@
 """``pneumarm setup``: the first day of an arm, from a blank board to an agent, by questions and answers."""
 
+import secrets
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
@@ -17,10 +19,13 @@ from pneumarm.checkup import Checkup, CheckupSettings, Known, diagnose
 from pneumarm.commands.arm_ import Valve, click, measured_arm, to_mend, told_of, valves_of
 from pneumarm.commands.asking import SUPPLY, AtTerminal, Bars, Person, asked_for, calibrated, resting, vent
 from pneumarm.commands.common import Json, Measuring
+from pneumarm.commands.live_ import LOCAL, live_
+from pneumarm.commands.on_page import OnPage
 from pneumarm.commands.run_ import run_
 from pneumarm.console import say
-from pneumarm.errors import ArmFailure, UnusableInput
+from pneumarm.errors import ArmFailure, PneumarmError, UnusableInput
 from pneumarm.files import require_folder
+from pneumarm.live.questions import QuestionPage
 from pneumarm.run import RunSettings
 
 _OPEN, _BETWEEN = 0.3, 0.3  # s that a valve is open when it clicks, and closed between two clicks
@@ -38,6 +43,9 @@ def setup_(
     *,
     out: Path = Path("arm.toml"),
     folder: Path | None = None,
+    page: bool = False,
+    host: str = "127.0.0.1",
+    port: int = 8642,
     seed: int = 0,
     settings: Annotated[CheckupSettings, Measuring] = CheckupSettings(),
     learning: Annotated[RunSettings, Parameter(name="run")] = RunSettings(),
@@ -56,22 +64,60 @@ def setup_(
         File to write, arm.toml: what is answered, and in the end the calibrated arm.
     folder
         Folder of the run in which the arm learns; by default named after the file, arm-run.
+    page
+        Ask on a page in the browser, such as that of a phone beside the arm, and go on there to `pneumarm live`.
+    host
+        Address of the page: that of this machine, or 0.0.0.0, for a phone; its address then holds a token.
+    port
+        Port of the page.
     seed
         Random seed of a virtual arm's noise.
     """
     require_folder(out)
-    person = AtTerminal()
-    name = arm or _found(person)
-    if ",spec=" in name:
-        raise UnusableInput(f"{name}: leave out spec=; {out} is written here, and read if it is there")
-    day = _FirstDay(name, out, seed, settings, person)
+    if arm is not None and ",spec=" in arm:
+        raise UnusableInput(f"{arm}: leave out spec=; {out} is written here, and read if it is there")
+    run = folder or out.with_name(f"{out.stem}-run")
+    if page:
+        token = None if host in LOCAL else secrets.token_urlsafe(12)
+        asking = OnPage(QuestionPage(host, port, token))
+        with asking.page.served():
+            say(f"open {asking.page.url}")
+            day = _persistently(asking, lambda: _calibrated_day(arm, out, seed, settings, asking))
+        name, port = day.calibrated_name, asking.page.port
+        live_(str(run), arm=name, host=host, port=port, token=token, browser=False, seed=seed, json=json)
+        return
+    day = _calibrated_day(arm, out, seed, settings, AtTerminal())
+    day.learn(run, learning, json)
+    say(f"Now drag it: pneumarm live {run} --arm {day.calibrated_name}")
+
+
+def _calibrated_day(arm: str | None, out: Path, seed: int, settings: CheckupSettings, person: Person) -> "_FirstDay":
+    """Return the first day of an arm when that is calibrated."""
+    day = _FirstDay(arm or _found(person), out, seed, settings, person)
     day.put_firmware_on()
     day.describe()
     day.try_wires()
     day.calibrate()
-    run = folder or out.with_name(f"{out.stem}-run")
-    day.learn(run, learning, json)
-    say(f"Now drag it: pneumarm live {run} --arm {day.calibrated_name}")
+    return day
+
+
+def _persistently(person: OnPage, work: Callable[[], "_FirstDay"]) -> "_FirstDay":
+    """Return what ``work`` returns; after a failure, or a stop on the page, it goes on when somebody says so."""
+    failed = False
+    while True:
+        person.page.stopped.clear()
+        try:
+            if failed:
+                person.show(())
+                person.line("Go on where that was? Then press Enter.")
+            return work()
+        except PneumarmError as error:
+            person.say(str(error))
+        except KeyboardInterrupt:
+            if not person.page.stopped.is_set():
+                raise
+            person.say("Stopped: everything is vented.")
+        failed = True
 
 
 def _found(person: Person) -> str:

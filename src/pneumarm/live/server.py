@@ -11,7 +11,7 @@ import socket
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
-from functools import partial
+from functools import cache, partial
 from importlib.resources import files
 from types import FrameType
 from urllib.parse import quote, urlsplit
@@ -55,19 +55,15 @@ class LiveServer:
     def __init__(self, live_arm: LiveArm, host: str, port: int, token: str | None) -> None:
         self.live_arm, self.token = live_arm, token
         self._host = host
-        self._socket = _bound(host, port)
+        self._socket = bound_to(host, port)
         self._port = int(self._socket.getsockname()[1])
-        self._files = dict(_page_files())
         self._serving: _Uvicorn | None = None
         self._door = Door()
 
     @property
     def url(self) -> str:
         """Where the page is."""
-        host = _own_address() if self._host in ("0.0.0.0", "::") else self._host
-        host = f"[{host}]" if ":" in host else host
-        token = f"?token={quote(self.token, '', errors='surrogateescape')}" if self.token else ""
-        return f"http://{host}:{self._port}/{token}"
+        return address_of_page(self._host, self._port, self.token)
 
     def run(self, opened: Callable[[], None] = lambda: None) -> None:
         """Serve until the program, or :meth:`end`, asks for the end; ``opened`` is called once it can be reached."""
@@ -111,34 +107,17 @@ class LiveServer:
             self._serving.should_exit = True
 
     def _allowed(self, connection: HTTPConnection) -> bool:
-        """Whether who asks knows the token, or comes from this machine where there is none."""
-        host = connection.headers.get("host", "")
-        origin = connection.headers.get("origin")
-        try:
-            local = urlsplit(f"//{host}").hostname in _LOCAL
-            foreign = origin is not None and urlsplit(origin).netloc != host
-        except ValueError:  # no address of a host
-            return False
-        if foreign or self.token is None:
-            return local and not foreign
-        given = connection.query_params.get("token", "")
-        return hmac.compare_digest(*(one.encode(errors="surrogateescape") for one in (given, self.token)))
+        return allowed(connection, self.token)
 
     async def _page(self, request: Request) -> Response:
         self._door.hear(request.client)
         if not self._allowed(request):
             return Response("open the address that pneumarm has printed, token and all", 403)
-        return self._answer("index.html")
+        return page_file("index.html")
 
     async def _file(self, request: Request) -> Response:
         self._door.hear(request.client)
-        return self._answer(request.path_params["name"])
-
-    def _answer(self, name: str) -> Response:
-        content = self._files.get(name)
-        if content is None:
-            return Response("not found", 404)
-        return Response(content, media_type=_TYPES.get(name.rpartition(".")[2], "text/plain"), headers=_HEADERS)
+        return page_file(request.path_params["name"])
 
     async def _connection(self, socket: WebSocket) -> None:
         await socket.accept()
@@ -234,17 +213,52 @@ class _Uvicorn(uvicorn.Server):
         super().handle_exit(sig, frame)
 
 
-def _page_files() -> Iterator[tuple[str, bytes]]:
-    """Yield the files of the page, by their address."""
+def allowed(connection: HTTPConnection, token: str | None) -> bool:
+    """Return whether who asks knows the ``token``, or comes from this machine where there is none."""
+    host = connection.headers.get("host", "")
+    origin = connection.headers.get("origin")
+    try:
+        local = urlsplit(f"//{host}").hostname in _LOCAL
+        foreign = origin is not None and urlsplit(origin).netloc != host
+    except ValueError:  # no address of a host
+        return False
+    if foreign or token is None:
+        return local and not foreign
+    given = connection.query_params.get("token", "")
+    return hmac.compare_digest(*(one.encode(errors="surrogateescape") for one in (given, token)))
+
+
+def address_of_page(host: str, port: int, token: str | None) -> str:
+    """Return where a page is that is served at ``host`` and ``port``."""
+    host = _own_address() if host in ("0.0.0.0", "::") else host
+    host = f"[{host}]" if ":" in host else host
+    query = f"?token={quote(token, '', errors='surrogateescape')}" if token else ""
+    return f"http://{host}:{port}/{query}"
+
+
+def page_file(name: str) -> Response:
+    """Return the file of the page called ``name``."""
+    content = _page_files().get(name)
+    if content is None:
+        return Response("not found", 404)
+    return Response(content, media_type=_TYPES.get(name.rpartition(".")[2], "text/plain"), headers=_HEADERS)
+
+
+@cache
+def _page_files() -> dict[str, bytes]:
+    """Return the files of the page, by their address."""
+    found: dict[str, bytes] = {}
     page = files("pneumarm.live") / "page"
     for place in page.iterdir():
         if place.is_dir():
-            yield from ((f"{place.name}/{one.name}", one.read_bytes()) for one in place.iterdir())
+            found |= {f"{place.name}/{one.name}": one.read_bytes() for one in place.iterdir()}
         else:
-            yield place.name, place.read_bytes()
+            found[place.name] = place.read_bytes()
+    return found
 
 
-def _bound(host: str, port: int) -> socket.socket:
+def bound_to(host: str, port: int) -> socket.socket:
+    """Return a socket at ``host`` and ``port``; UnusableInput where there is none."""
     try:
         family = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0][0]
         bound = socket.socket(family, socket.SOCK_STREAM)

@@ -95,27 +95,20 @@ def demonstrate(agent: AnyAgent, arm: Arm, seed: int) -> list[Demonstration]:
     goals = goals_of(agent)
     low, high = goals.range.T
     shown = []
+
+    def between(begin: NDArray[np.float64], end: NDArray[np.float64], name: str) -> Demonstration:
+        BEGIN.reach(cycle.arm, random)
+        _move(agent, cycle, begin)
+        cycle.arm.wait(_TAIL)
+        return _recorded(agent, cycle, end, name)
+
     for name, degrees in DISPLACEMENTS.items():
         half = degrees * arm.spec.counts_per_degree / 2
         middle = (low + high) / 2
         if (half < (high - low) / 2).all():
             ends = (goals.within(middle - half), goals.within(middle + half))
-            shown.append(cycle.arm.despite_losses(partial(_demonstrate, agent, cycle, random, *ends, name)))
+            shown.append(cycle.arm.despite_losses(partial(between, *ends, name)))
     return shown
-
-
-def _demonstrate(
-    agent: AnyAgent,
-    cycle: ControlCycle,
-    random: np.random.Generator,
-    begin: NDArray[np.float64],
-    end: NDArray[np.float64],
-    name: str,
-) -> Demonstration:
-    BEGIN.reach(cycle.arm, random)
-    _move(agent, cycle, begin)
-    cycle.arm.wait(_TAIL)
-    return _recorded(agent, cycle, end, name)
 
 
 def _move(agent: AnyAgent, cycle: ControlCycle, goal: NDArray[np.float64]) -> Movement:

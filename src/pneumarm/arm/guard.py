@@ -467,11 +467,7 @@ class GuardedArm(Arm):
         """Return what ``work`` returns; where the line to the arm is lost in it, it is done again from its beginning.
 
         ``work`` is a movement or a measurement that does not depend on where the arm was, or that brings it there
-        itself: the arm is vented while nobody is heard.
-
-        Raises:
-            ArmFailure: anything else is wrong with the arm, or the line is lost too often, or for too long.
-
+        itself: the arm is vented while nobody is heard. Whatever else is wrong with the arm is raised.
         """
         lost = False
         while True:

@@ -137,8 +137,6 @@ class Answers:
     """Questions about the arm that are answered; the answers are in the spec."""
     supply: PositiveFloat | None = None
     """Pressure of the supply [bar gauge]."""
-    counts_per_degree: PositiveFloat | None = None
-    """Of the angle's sensors, of an arm that is not measured."""
     valves: NonNegativeInt = 0
     """Valves that were heard to click, in their order."""
     turned: NonNegativeInt = 0

@@ -12,7 +12,6 @@ from queue import Empty, Queue
 from threading import Thread
 
 import numpy as np
-from rich.status import Status
 
 from pneumarm.arm import GuardedArm
 from pneumarm.checkup import ArmCalibration, Checkup, Known, calibrate, ends, fill_alone
@@ -32,6 +31,13 @@ _TURNED = (-360.0, 360.0)  # degrees that a protractor can show
 
 Bars = Sequence[tuple[str, float, str]]
 """Names, shares of their ranges, and values in words, of what is shown as bars."""
+Meanwhile = Callable[[], object]
+"""What an arm needs while somebody thinks."""
+Range = tuple[float, float]
+
+
+def nothing() -> None:
+    """Do nothing."""
 
 
 class Person(ABC):
@@ -50,29 +56,16 @@ class Person(ABC):
 
     @abstractmethod
     def line(
-        self,
-        question: str,
-        meanwhile: Callable[[], object] = lambda: None,
-        *,
-        choices: Sequence[str] = (),
-        numbers: bool = False,
+        self, question: str, meanwhile: Meanwhile = nothing, choices: Sequence[str] = (), numbers: bool = False
     ) -> str:
         """Return the answer to ``question``; ``meanwhile`` is called over and over until it is there.
 
-        Where there are ``choices`` or ``numbers`` are wanted, that is how it is asked; any answer may come all the
-        same.
-
-        Raises:
-            UnusableInput: nobody will answer any more.
-
+        Where there are ``choices`` or ``numbers`` are wanted, that is how it is asked; any answer may come. Raises
+        UnusableInput where nobody will answer any more.
         """
 
     def number(
-        self,
-        question: str,
-        between: tuple[float, float],
-        meanwhile: Callable[[], object] = lambda: None,
-        usual: float | None = None,
+        self, question: str, between: Range, meanwhile: Meanwhile = nothing, usual: float | None = None
     ) -> float:
         """Return the number answered, asked for again until it is ``between`` two; ``usual`` for an empty line."""
         low, high = between
@@ -86,7 +79,7 @@ class Person(ABC):
             what = "is not a number" if math.isnan(value) else "is not possible"
             self.say(f"{answer!r} {what}: a number from {low:g} to {high:g} is needed.")
 
-    def choice(self, question: str, choices: Sequence[str], meanwhile: Callable[[], object] = lambda: None) -> str:
+    def choice(self, question: str, choices: Sequence[str], meanwhile: Meanwhile = nothing) -> str:
         """Return which of ``choices`` was answered, whole or by its first letter; it is asked again until one was."""
         while True:
             answer = self.line(question, meanwhile, choices=choices).lower()
@@ -101,7 +94,6 @@ class AtTerminal(Person):
 
     def __init__(self) -> None:
         self._lines: Queue[str | None] = Queue()
-        self._status: Status | None = None
         Thread(target=self._read, args=(sys.stdin.fileno(),), name="pneumarm answers", daemon=True).start()
 
     def say(self, text: str) -> None:
@@ -109,18 +101,10 @@ class AtTerminal(Person):
         say(text)
 
     def show(self, bars: Bars) -> None:
-        """Show ``bars`` below the last line; nothing where that is no terminal."""
-        if not ERRORS.is_terminal:
-            return
-        if self._status is None and bars:
-            self._status = Status("", console=ERRORS)
-            self._status.start()
-        if self._status is not None:
-            drawn = (f"{name} {('█' * round(_BAR * share)).ljust(_BAR, '░')} {value}" for name, share, value in bars)
-            self._status.update("   ".join(drawn))
-        if self._status is not None and not bars:
-            self._status.stop()
-            self._status = None
+        """Show ``bars`` in a line that is written over; nothing where that is no terminal."""
+        drawn = (f"{name} {('█' * round(_BAR * share)).ljust(_BAR, '░')} {value}" for name, share, value in bars)
+        if ERRORS.is_terminal:
+            print(f"\r{'   '.join(drawn)}", end="" if bars else "\n", file=sys.stderr, flush=True)
 
     def _read(self, descriptor: int) -> None:
         """Put what is typed into the queue; in the end None."""
@@ -135,12 +119,7 @@ class AtTerminal(Person):
         self._lines.put(None)
 
     def line(
-        self,
-        question: str,
-        meanwhile: Callable[[], object] = lambda: None,
-        *,
-        choices: Sequence[str] = (),
-        numbers: bool = False,
+        self, question: str, meanwhile: Meanwhile = nothing, choices: Sequence[str] = (), numbers: bool = False
     ) -> str:
         """Return the line that is typed; on a terminal what was typed before the question is no answer to it."""
         while sys.stdin.isatty() and not self._lines.empty():
@@ -167,7 +146,7 @@ def as_number(answer: str) -> float:
     return value if math.isfinite(value) else math.nan
 
 
-def resting(guard: GuardedArm) -> Callable[[], None]:
+def resting(guard: GuardedArm) -> Meanwhile:
     """Return what is to be called over and over while an arm stands still: hardware knows by it that we are there."""
     return lambda: guard.despite_losses(lambda: guard.wait(0.0))
 
@@ -209,9 +188,7 @@ def asked_for(
     return known
 
 
-def calibrated(
-    checkup: Checkup, known: Known, person: Person, meanwhile: Callable[[], object]
-) -> tuple[ArmCalibration, Known]:
+def calibrated(checkup: Checkup, known: Known, person: Person, meanwhile: Meanwhile) -> tuple[ArmCalibration, Known]:
     """Return the calibration by what is ``known``, and that; where pressures tell nothing, their scale is asked for.
 
     Raises:

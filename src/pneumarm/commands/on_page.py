@@ -1,10 +1,10 @@
 """Whoever is told and asked on a page, in a browser beside the arm."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from queue import Empty
 
-from pneumarm.commands.asking import Bars, Person
+from pneumarm.commands.asking import Bars, Meanwhile, Person, nothing
 from pneumarm.console import say
 from pneumarm.live.questions import QuestionPage
 from pneumarm.progress import Report, progress
@@ -36,18 +36,10 @@ class OnPage(Person):
                 told(done, total)
                 self.page.shown["doing"] = [title, round(done), round(total)]
 
-            try:
-                yield report
-            finally:
-                self.page.shown["doing"] = None
+            yield report
 
     def line(
-        self,
-        question: str,
-        meanwhile: Callable[[], object] = lambda: None,
-        *,
-        choices: Sequence[str] = (),
-        numbers: bool = False,
+        self, question: str, meanwhile: Meanwhile = nothing, choices: Sequence[str] = (), numbers: bool = False
     ) -> str:
         """Return what was answered on the page."""
         say(question)

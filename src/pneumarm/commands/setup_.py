@@ -121,20 +121,14 @@ def _persistently(person: OnPage, work: Callable[[], "_FirstDay"]) -> "_FirstDay
 
 
 def _found(person: Person) -> str:
-    """Return the name of the arm at a USB port, chosen by a person where there are several.
-
-    Raises:
-        UnusableInput: there is none.
-
-    """
+    """Return the name of the arm at a USB port, chosen by a person where there are several."""
     found = boards()
     if not found:
         raise UnusableInput(
             "no board is at any USB port; plug it in, or name another arm: pneumarm setup serial:PORT"
         )
-    for number, (path, what) in enumerate(found, 1):
-        person.say(f"{number}: {path} ({what})")
-    number = 1 if len(found) == 1 else round(person.number("Which is the arm's board?", (1, len(found))))
+    listed = "; ".join(f"{number}: {path} ({what})" for number, (path, what) in enumerate(found, 1))
+    number = 1 if len(found) == 1 else round(person.number(f"Which is the board? {listed}", (1, len(found))))
     return f"serial:{found[number - 1][0]}"
 
 
@@ -143,24 +137,25 @@ class _FirstDay:
 
     def __init__(self, name: str, out: Path, seed: int, settings: CheckupSettings, person: Person) -> None:
         self.name, self.out, self.seed, self.person = name, out, seed, person
+        self.calibrated_name = f"{name},spec={out}"
         self.asks = name.startswith("serial:")
         """Whether only a person can tell about the arm; others know themselves."""
         # What the manometer shows is compared with muscles that are full.
         self.settings = replace(settings, fill=max(settings.fill, _FILL)) if self.asks else settings
-        self.file: ArmFile | None = None
-        if out.exists():
-            self.file = load_arm_file(out)
+        self.begun = out.exists()
+        self.file = load_arm_file(out) if self.begun else ArmFile(ArmSpec(name=name), setup=Answers())
+        if self.begun:
             person.say(f"{out} is there already: going on with what it says.")
 
     @property
-    def calibrated_name(self) -> str:
-        """What the arm is called from now on."""
-        return f"{self.name},spec={self.out}"
+    def calibrated(self) -> bool:
+        """Whether nothing is to be asked any more."""
+        return self.file.setup is None
 
     @property
-    def answers(self) -> Answers | None:
-        """What was answered so far; None of an arm that is calibrated."""
-        return None if self.file is None else self.file.setup
+    def answers(self) -> Answers:
+        """What was answered so far."""
+        return self.file.setup or Answers()
 
     def keep(self, spec: ArmSpec, answers: Answers) -> None:
         """Keep what was answered."""
@@ -168,9 +163,7 @@ class _FirstDay:
         save_arm_file(self.file, self.out)
 
     def _note(self, **answered: object) -> None:
-        assert self.file is not None
-        assert self.file.setup is not None
-        self.keep(self.file.spec, replace(self.file.setup, **answered))  # type: ignore[arg-type]
+        self.keep(self.file.spec, replace(self.answers, **answered))  # type: ignore[arg-type]
 
     # ---- the board
 
@@ -196,20 +189,15 @@ class _FirstDay:
 
     def describe(self) -> None:
         """Ask what the arm is, question by question, from the first one that is not answered."""
-        if not self.asks:
-            if self.file is None:
-                with open_arm(self.name, self.seed) as opened:
-                    self.keep(opened.spec, Answers())
-            return
-        if self.file is None:
-            self.keep(ArmSpec(name=self.name), Answers())
-        assert self.file is not None
-        if self.file.setup is None:
+        if not self.asks and not self.begun:
+            with open_arm(self.name, self.seed) as opened:
+                self.keep(opened.spec, Answers())
+        if not self.asks or self.calibrated:
             return
         questions = (self._ask_joints, self._ask_muscles, self._ask_sensors, self._ask_highest, self._ask_supply)
         for number, question in enumerate(questions, 1):
-            if self.file.setup.questions < number:
-                spec, answers = question(self.file.spec, self.file.setup)
+            if self.answers.questions < number:
+                spec, answers = question(self.file.spec, self.answers)
                 self.keep(spec, replace(answers, questions=number))
 
     def _ask_joints(self, spec: ArmSpec, answers: Answers) -> tuple[ArmSpec, Answers]:
@@ -225,9 +213,7 @@ class _FirstDay:
             return replace(spec, pressure_sensors=True), answers
         question = "Then nothing but the supply limits the pressure. Can its highest pressure burst a muscle?"
         while self.person.choice(question, ("yes", "no")) == "yes":
-            self.person.say(
-                "Turn the reducer down, and put a relief valve behind it that opens before a muscle bursts."
-            )
+            self.person.say("Turn the reducer down, and put a relief valve behind it that protects the muscles.")
         return replace(spec, pressure_sensors=False, safe_supply=True), answers
 
     def _ask_highest(self, spec: ArmSpec, answers: Answers) -> tuple[ArmSpec, Answers]:
@@ -236,9 +222,7 @@ class _FirstDay:
         return replace(spec, max_pressure=self.person.number(question, SUPPLY, usual=usual)), answers
 
     def _ask_supply(self, spec: ArmSpec, answers: Answers) -> tuple[ArmSpec, Answers]:
-        question = (
-            f"Set the supply's reducer to {spec.max_pressure:g} bar or less. What does its manometer show [bar]?"
-        )
+        question = f"Set the supply to {spec.max_pressure:g} bar or less. What does its manometer show [bar]?"
         supply = self.person.number(question, (SUPPLY[0], spec.max_pressure))
         if spec.pressure_sensors and spec.muscles == 2:
             return spec, replace(answers, supply=supply)
@@ -250,7 +234,7 @@ class _FirstDay:
 
     def try_wires(self) -> None:
         """Click the valves and have the joints turned by hand, as far as that was not done."""
-        if self.answers is None:
+        if self.calibrated:
             return
         with open_arm(self.name, self.seed, self.out) as opened:
             guard = guarded(opened)
@@ -259,7 +243,6 @@ class _FirstDay:
             self._turn_joints(guard)
 
     def _click_valves(self, guard: GuardedArm, valves: list[Valve]) -> None:
-        assert self.answers is not None
         number = self.answers.valves
         if number < len(valves):
             question = "Turn the air off and the valves' power on, then press Enter. Each valve clicks twice."
@@ -273,14 +256,14 @@ class _FirstDay:
             number = {"yes": number + 1, "back": max(number - 1, 0)}.get(answer, number)
             self._note(valves=number)
             if answer == "no":
+                pin = _FIRST_PIN + 2 * (2 * valve.joint + valve.muscle) + (valve.value < 0)
                 self.person.say(
-                    f"Its pin is D{_pin(valve)}. Check the wire from there to the MOSFET, the valve's plug and its "
+                    f"Its pin is D{pin}. Check the wire from there to the MOSFET, the valve's plug and its "
                     "power. If another valve clicked, swap the wires of the two."
                 )
                 self.person.line("Press Enter and it clicks again.", resting(guard))
 
     def _turn_joints(self, guard: GuardedArm) -> None:
-        assert self.answers is not None
         joint = self.answers.turned
         while joint < guard.spec.joints:
             ends = []
@@ -313,9 +296,8 @@ class _FirstDay:
 
     def calibrate(self) -> None:
         """Check the arm until nothing hinders, calibrate it and write its file, unless it is calibrated."""
-        if self.answers is None:
+        if self.calibrated:
             return
-        assert self.file is not None
         done = replace(self.file, setup=None)
         if self.file.spec.pressure_sensors and self.file.spec.muscles == 2:
             with open_arm(self.name, self.seed, self.out) as opened:
@@ -325,7 +307,6 @@ class _FirstDay:
         self.person.say(f"{self.out}: the arm is calibrated.")
 
     def _calibrated(self, guard: GuardedArm) -> ArmFile:
-        assert self.answers is not None
         known = Known(angles=self.answers.angles, supply=self.answers.supply)
         while True:
             checkup = self._sound(guard)
@@ -342,7 +323,6 @@ class _FirstDay:
 
     def _sound(self, guard: GuardedArm) -> Checkup:
         """Return the check-up of an arm with which nothing is wrong that hinders; it is mended until then."""
-        assert self.answers is not None
         at = f" at {self.answers.supply:g} bar" if self.answers.supply else ""
         while True:
             self._stand_clear(guard, f"Turn the air on{at}. The arm is checked for two minutes, muscle by muscle.")
@@ -375,11 +355,6 @@ def _click_twice(guard: GuardedArm, valve: Valve) -> None:
     for _ in range(2):
         click(guard, valve, _OPEN)
         guard.wait(_BETWEEN)
-
-
-def _pin(valve: Valve) -> int:
-    """Return the number of the board's digital pin that a ``valve`` hangs on."""
-    return _FIRST_PIN + 2 * (2 * valve.joint + valve.muscle) + (valve.value < 0)
 
 
 def _wrong_with(spec: ArmSpec, joint: int, first: NDArray[np.float64], second: NDArray[np.float64]) -> str | None:

@@ -20,16 +20,13 @@ from pneumarm.live.server import address_of_page, allowed, bound_to, page_file
 _LARGEST = 1000  # bytes of an answer
 _KEPT = 200  # lines that were said
 _TURN = 0.02  # s between two looks whether it is served
+_SHOWN = "setup/shown"
+DONE = Response(status_code=204)
 REFUSED = Response("open the address that pneumarm has printed, token and all", 403)
 
 
 class QuestionPage:
-    """What is said and asked, and the answers, at ``host`` and ``port``, for whoever knows the ``token``.
-
-    Raises:
-        UnusableInput: the host is none of this machine, or the port is taken.
-
-    """
+    """What is said and asked, and the answers, at ``host`` and ``port``, for whoever knows the ``token``."""
 
     def __init__(self, host: str, port: int, token: str | None) -> None:
         self.shown: dict[str, Any] = {"said": [], "asked": 0, "question": "", "choices": [], "numbers": False}
@@ -49,18 +46,15 @@ class QuestionPage:
         """Show a question; answers to those before it no longer count."""
         while not self.answers.empty():
             self.answers.get()
-        self.shown |= {"question": question, "choices": choices, "numbers": numbers, "asked": self.shown["asked"] + 1}
+        asked = self.shown["asked"] + 1
+        self.shown |= {
+            "question": question, "choices": choices, "numbers": numbers, "asked": asked, "doing": None,
+        }  # fmt: skip
 
     @contextmanager
     def served(self) -> Iterator[None]:
         """Serve the page from another thread while the block runs; a stop interrupts this one, the main thread."""
-        routes = [
-            Route("/setup/shown", self._show),
-            Route("/setup/answer", self._take, methods=["POST"]),
-            Route("/setup/stop", self._stop, methods=["POST"]),
-            Route("/", self._page),
-            Route("/{name:path}", self._file),
-        ]
+        routes = [Route("/setup/{what}", self._post, methods=["POST"]), Route("/{name:path}", self._get)]
         server = uvicorn.Server(uvicorn.Config(Starlette(routes=routes), log_level="error", lifespan="off"))
         serving = Thread(target=server.run, kwargs={"sockets": [self._socket]}, name="setup page", daemon=True)
         serving.start()
@@ -73,34 +67,24 @@ class QuestionPage:
             serving.join()
             self._socket.close()
 
-    async def _page(self, request: Request) -> Response:
-        return page_file("setup.html") if allowed(request, self._token) else REFUSED
-
-    async def _file(self, request: Request) -> Response:
-        return page_file(request.path_params["name"])
-
-    async def _show(self, request: Request) -> Response:
+    async def _get(self, request: Request) -> Response:
+        name = request.path_params["name"]
+        if name not in ("", _SHOWN):
+            return page_file(name)
         if not allowed(request, self._token):
             return REFUSED
-        return Response(json.dumps(self.shown), media_type="application/json")
+        return Response(json.dumps(self.shown), media_type="application/json") if name else page_file("setup.html")
 
-    async def _take(self, request: Request) -> Response:
+    async def _post(self, request: Request) -> Response:
         if not allowed(request, self._token):
             return REFUSED
-        content = bytearray()
-        async for part in request.stream():
-            content += part
-            if len(content) > _LARGEST:
-                return Response("too long", 413)
+        if request.path_params["what"] == "stop":
+            self.stopped.set()
+            signal.pthread_kill(main_thread().ident or 0, signal.SIGINT)  # ends waits too
+            return DONE
+        content = (await anext(request.stream()))[:_LARGEST]
         number, _, answer = content.decode(errors="replace").partition(" ")
         if number == str(self.shown["asked"]) and self.shown["question"]:
             self.shown["question"] = ""
             self.answers.put(answer.strip())
-        return Response(status_code=204)
-
-    async def _stop(self, request: Request) -> Response:
-        if not allowed(request, self._token):
-            return REFUSED
-        self.stopped.set()
-        signal.pthread_kill(main_thread().ident or 0, signal.SIGINT)  # ends waits too
-        return Response(status_code=204)
+        return DONE

@@ -253,43 +253,32 @@ def track(
     """
     check_seconds(seconds)
     cycle = ControlCycle(guarded(arm))
-    return cycle.arm.despite_losses(
-        lambda: _track(cycle, controller, reference, seconds, lead_in, watch, seen, record)
-    )
 
+    def follow() -> Tracked:
+        cycle.arm.make_ready()
+        coming = replace(reference, at=lambda time: reference.at(max(time - lead_in, 0.0)))
+        controller.reset(reference.at(0.0))
+        controller.track(coming)
+        before = played(cycle, controller, lead_in, coming.at, watch, seen) if lead_in > 0 else None
+        air = cycle.arm.air_used()
+        recorded = played(cycle, controller, seconds, reference.at, watch, seen, record)
+        # Turns come milliseconds early or late: the reference began when it was said to, not with a turn.
+        start = float(recorded.time[0] if before is None else before.time[0] + lead_in)
+        passed = recorded.time - start
+        wanted = np.array([reference.at(max(float(time), 0.0)) for time in passed])
+        error = (recorded.angle - wanted) / cycle.arm.spec.counts_per_degree
+        return Tracked(
+            time_start=start,
+            seconds=float(passed[-1]),
+            rms_error=np.sqrt((error**2).mean(axis=0)),
+            switches=int(valve_changes(recorded.command[:-1]).sum()),
+            air=_air_since(cycle.arm, air),
+            recorded=recorded,
+            wanted=wanted,
+            spec=cycle.arm.spec,
+        )
 
-def _track(
-    cycle: ControlCycle,
-    controller: TrackingController,
-    reference: Reference,
-    seconds: float,
-    lead_in: float,
-    watch: Watch | None,
-    seen: Seen | None,
-    record: Recorder | None,
-) -> Tracked:
-    cycle.arm.make_ready()
-    coming = replace(reference, at=lambda time: reference.at(max(time - lead_in, 0.0)))
-    controller.reset(reference.at(0.0))
-    controller.track(coming)
-    before = played(cycle, controller, lead_in, coming.at, watch, seen) if lead_in > 0 else None
-    air = cycle.arm.air_used()
-    recorded = played(cycle, controller, seconds, reference.at, watch, seen, record)
-    # Turns come milliseconds early or late: the reference began when it was said to, not with a turn.
-    start = float(recorded.time[0] if before is None else before.time[0] + lead_in)
-    passed = recorded.time - start
-    wanted = np.array([reference.at(max(float(time), 0.0)) for time in passed])
-    error = (recorded.angle - wanted) / cycle.arm.spec.counts_per_degree
-    return Tracked(
-        time_start=start,
-        seconds=float(passed[-1]),
-        rms_error=np.sqrt((error**2).mean(axis=0)),
-        switches=int(valve_changes(recorded.command[:-1]).sum()),
-        air=_air_since(cycle.arm, air),
-        recorded=recorded,
-        wanted=wanted,
-        spec=cycle.arm.spec,
-    )
+    return cycle.arm.despite_losses(follow)
 
 
 def played(

@@ -240,10 +240,8 @@ class SerialArm(Arm):
     def regain(self) -> None:
         """Take up the arm after its line was lost, or after its dead-man vented it; wait for the board if need be.
 
-        Raises:
-            ArmFailure: a person has to look: another board, other firmware, a board that restarted by itself,
-                a muscle over its limit; or the line is lost too often, or for too long.
-
+        ArmFailure where a person has to look: another board, other firmware, a board that restarted by itself, a
+        muscle over its limit; or where the line is lost too often, or for too long.
         """
         begun, why = self._line.now(), self.link.lost or "its dead-man vented the arm"
         self._lost_at.append(begun)

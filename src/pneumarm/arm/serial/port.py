@@ -93,17 +93,11 @@ def _identity(port: Any) -> tuple[object, ...] | None:
 
 
 def _path_of(usb: tuple[object, ...], before: str) -> str:
-    """Return where the device ``usb`` is now, that was at ``before``.
-
-    Raises:
-        OSError: it is nowhere.
-
-    """
+    """Return where the device ``usb`` is now, that was at ``before``; OSError where it is nowhere."""
     found = [port.device for port in list_ports.comports() if _identity(port) == usb]
     if not found:
         raise OSError(f"the board that was at {before} is at no port")
-    same = [path for path in found if os.path.realpath(path) == os.path.realpath(before)]
-    return before if same else str(found[0])
+    return before if os.path.realpath(before) in map(os.path.realpath, found) else str(found[0])
 
 
 def _opened(path: str) -> serial.Serial:

@@ -25,7 +25,10 @@ def flash(port: str) -> int:
     """
     avrdude = shutil.which("avrdude")
     if avrdude is None:
-        raise UnusableInput("avrdude is not on this computer; on Debian: apt install avrdude")
+        raise UnusableInput(
+            "avrdude is not on this computer. Debian: apt install avrdude; macOS: brew install avrdude; Windows: "
+            "winget install AVRDudes.AVRDUDE"
+        )
     if not os.path.exists(port):
         raise UnusableInput(f"{port}: no such port; is the board plugged in?")
     said = ""

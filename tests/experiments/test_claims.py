@@ -11,7 +11,8 @@ import pytest
 from pneumarm.cli import main
 from pneumarm.errors import UnusableInput
 from pneumarm.experiments.all_goals import EXPERIMENT as ALL_GOALS
-from pneumarm.experiments.claims import conclusions, judge, keys_of, read_all_results, sections, summary
+from pneumarm.experiments.claims import conclusions, judge, keys_of, read_all_results, summary
+from pneumarm.experiments.claims.page import sections
 from pneumarm.experiments.experiment import Analysis, Claim, Row, TrialRows, sorted_rows
 from pneumarm.experiments.factorial import Factorial
 from pneumarm.experiments.registry import PLACES, experiment
@@ -29,7 +30,16 @@ OF_THE_THESIS = {
 
 def results(folder: Path, name: str, claims: list[tuple[str, str]], arms: int = 5, runs: int = 4) -> None:
     """Write the results of an experiment whose claims are about and have the verdict given."""
-    rest = {"thesis": "1", "ours": "2", "stated": "holds above 0", "medians": "3", "why": "", "p": 0.0001}
+    rest = {
+        "thesis": "1",
+        "ours": "2",
+        "stated": "holds above 0",
+        "medians": "3",
+        "why": "",
+        "p": 0.0001,
+        "criterion": {"above": 0, "matters": 1},
+        "parts": [],
+    }
     found = [{"claim": a, "verdict": v, "about": a, "arms": 9 * (v == OPEN), **rest} for a, v in claims]
     (folder / name).mkdir(parents=True)
     about = {"experiment": name, "arms": [f"arm {n}" for n in range(arms)], "runs": runs, "claims": found, "rows": 3}
@@ -63,7 +73,8 @@ def test_verdicts_add_up(tmp_path: Path) -> None:
     expected = {"sarsa": "holds", "neurons": "in part", "gamma": OPEN, "traces": "in part"}
     assert {key: found[key].verdict for key in expected} == expected
     assert found["learning-rate"].verdict == OPEN  # all-goals was run and said nothing of it
-    assert found["q-fluctuates"].verdict == "not run"
+    assert found["q-fluctuates"].verdict == OPEN
+    assert "Not run: long-training; 5 arms at least are needed." in found["q-fluctuates"].explained()
     both = found["shaping-not-indispensable"]
     assert len(both.claims) == 1
     assert both.missing == ("shaping-settings",)
@@ -76,10 +87,11 @@ def test_what_no_experiment_decides_says_what_would(tmp_path: Path) -> None:
     made = judge(read_all_results(tmp_path))
     lacking = [each for each in made if not each.conclusion.experiments]
     assert len(lacking) >= 7
-    titles = {section.title: section.text[0] for section in sections(made, tmp_path)}
+    titles = {section.title: section.text[0] for section in sections(made)}
     for each in lacking:
         assert each.verdict == OPEN
-        assert titles[each.conclusion.says] == f"Verdict: {OPEN}. What would decide it: {each.conclusion.lacks}."
+        said = f"Verdict: {OPEN}. What would decide it: {each.conclusion.lacks}."
+        assert titles[each.conclusion.says] == f"Thesis section {each.conclusion.section}. {said}"
 
 
 def test_the_page_of_one_arm_speaks_of_it_alone(tmp_path: Path) -> None:
@@ -90,9 +102,7 @@ def test_the_page_of_one_arm_speaks_of_it_alone(tmp_path: Path) -> None:
     table = rows(ALL_GOALS, wobble, arms=1)
     found = claims(ALL_GOALS, table)
     assert {claim.verdict for claim in found} == {OPEN}
-    page = write_page(
-        ALL_GOALS, tmp_path / "one" / "all-goals", Analysis([], {}, [], found), 4, table.arms
-    ).read_text()
+    page = write_page(ALL_GOALS, tmp_path / "one" / "all-goals", Analysis([], {}, [], found), table).read_text()
     assert "All of it is true of arm 0 alone" in page
     assert "one arm, of which alone this speaks" in page
     assert f"{len(found)} claims: {len(found)} undecided by this design" in page
@@ -103,7 +113,7 @@ def test_the_page_of_one_arm_speaks_of_it_alone(tmp_path: Path) -> None:
 def test_all_that_is_judged_at_once_is_told(tmp_path: Path) -> None:
     results(tmp_path, "all-goals", [("sarsa", "holds"), ("gamma", "does not hold"), ("traces", OPEN)])
     made = judge(read_all_results(tmp_path))
-    rules = " ".join(sections(made, tmp_path)[0].text)
+    rules = " ".join(sections(made)[0].text)
     assert "3 claims are judged one by one" in rules
     assert "Of the 2 that hold or are refuted 2 also stand" in rules
     assert "1 held up" in summary(made)[0]
@@ -116,15 +126,17 @@ def test_a_claim_about_nothing_listed_is_not_lost(tmp_path: Path) -> None:
     assert [claim.claim for _, claim in found.claims] == ["something else"]
 
 
-def test_what_is_missing_has_its_command(tmp_path: Path) -> None:
+def test_what_is_undecided_says_how_many_arms_would(tmp_path: Path) -> None:
     results(tmp_path, "all-goals", [("sarsa", "holds")], arms=1, runs=8)
     results(tmp_path, "long-training", [("q-fluctuates", OPEN)], arms=5, runs=4)
-    made = sections(judge(read_all_results(tmp_path)), tmp_path)
-    commands = {row[0]: row[-1] for row in made[-1].tables[0].rows}
-    assert commands["no-shaping"] == f"pneumarm experiment no-shaping --out {tmp_path}"
-    nine = f"pneumarm experiment long-training --out {tmp_path} --arms $(seq -f virtual:seed=%g -s , 1 9)"
-    assert commands["long-training"] == nine
-    assert set(commands) == OF_THE_THESIS - {"all-goals"}
+    found = {section.title: section for section in sections(judge(read_all_results(tmp_path)))}
+    for each in conclusions():
+        said = " ".join(found[each.says].text)
+        assert all(f"pneumarm experiment {name} --out laboratory" in said for name in each.experiments)
+        if each.key == "q-fluctuates":
+            assert "9 arms would decide all that is open" in said
+        elif "Verdict: holds." not in said:
+            assert "5 arms at least" in said or "What would decide it" in said
 
 
 def test_the_command_writes_the_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -138,20 +150,8 @@ def test_the_command_writes_the_page(tmp_path: Path, capsys: pytest.CaptureFixtu
     assert "5 arms, 20 runs" in (tmp_path / "claims.html").read_text()
 
 
-def test_the_table_for_a_note(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """All conclusions, each followed by its claims, thesis beside ours; the terminal shows the same."""
+def test_the_terminal_shows_all_conclusions(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     results(tmp_path, "all-goals", [("sarsa", "holds"), ("gamma", OPEN), ("sarsa", "does not hold")])
-    with pytest.raises(SystemExit) as ended:
-        main(["claims", "--out", str(tmp_path), "--markdown"])
-    assert ended.value.code == 0
-    lines = capsys.readouterr().out.splitlines()
-    assert {line.count(" | ") for line in lines[2:]} == {4}
-    assert len(lines) == 2 + len(conclusions()) + 3
-    at = next(i for i, line in enumerate(lines) if "SARSA is better" in line)
-    assert lines[at].endswith("| **in part** |")
-    assert lines[at + 1 : at + 3] == [
-        f"| sarsa | 1 | 2 | all-goals: 5 arms, 20 runs | {verdict} |" for verdict in ("holds", "does not hold")
-    ]
     with pytest.raises(SystemExit):
         main(["claims", "--out", str(tmp_path)])
     shown = " ".join(capsys.readouterr().out.split())
@@ -291,7 +291,7 @@ def test_results_carry_what_claims_need(tmp_path: Path) -> None:
     table = rows(ALL_GOALS, wobble)
     (tmp_path / "all-goals").mkdir()
     analysis = Analysis([], {"rows": 3}, [], claims(ALL_GOALS, table))
-    write_page(ALL_GOALS, tmp_path / "all-goals", analysis, table.runs, table.arms)
+    write_page(ALL_GOALS, tmp_path / "all-goals", analysis, table)
     found = read_all_results(tmp_path)["all-goals"]
     assert (len(found.arms), found.runs) == (3, 4)
     assert {claim.about for claim in found.claims} == keys_of("all-goals")

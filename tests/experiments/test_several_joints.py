@@ -76,7 +76,7 @@ def test_an_experiment_from_the_arm_to_its_page(chosen: SeveralJoints, laborator
     assert done.computed == len(chosen.trials)
     assert sweep(chosen, laboratory, [ARM], 1, SMALL).computed == 0
     analysis = chosen.analyse(done.rows)
-    page = write_page(chosen, laboratory / chosen.name, analysis, 1, (ARM,)).read_text()
+    page = write_page(chosen, laboratory / chosen.name, analysis, done.rows).read_text()
     assert {claim.about for claim in analysis.claims} == keys_of(chosen.name)
     assert "How the arm moved" in page
     assert "nan" not in re.sub(r'"data:[^"]*"', "", page)

@@ -97,7 +97,7 @@ def make_laboratory(folder: Path) -> None:
     claim(recording, {"arm": table.arms[0]})
     with open_arm(table.arms[0]) as arm, Store.for_arm(recording / STORE, arm.spec) as store:
         collect(arm, store, 2000)
-    write_page(ALL_GOALS, folder / ALL_GOALS.name, ALL_GOALS.analyse(table), table.runs, table.arms)
+    write_page(ALL_GOALS, folder / ALL_GOALS.name, ALL_GOALS.analyse(table), table)
     with pytest.raises(SystemExit):
         main(["claims", "--out", str(folder)])
 

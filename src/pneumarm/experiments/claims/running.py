@@ -1,0 +1,135 @@
+"""Running what the page of claims rests on: which experiments, which arms, and the rows that are published.
+
+A **pilot** takes the first five arms of each kind, as many as its time allows. From the spread that it finds follows
+how many arms each experiment needs (:meth:`.Criterion.arms_needed`); these numbers are written to ``arms.json`` once,
+before any further row is computed, so that nobody stops where it pleases. The **full** size takes that many.
+"""
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Literal, NamedTuple
+
+import msgspec
+
+from pneumarm.errors import PneumarmError
+from pneumarm.experiments.experiment import Experiment, LaboratorySettings, Row, TrialRows, sorted_rows
+from pneumarm.experiments.preparation import SETTINGS
+from pneumarm.experiments.registry import experiment
+from pneumarm.experiments.results import Results
+from pneumarm.experiments.row_file import read_trial_rows
+from pneumarm.experiments.sweep import ROWS, sweep
+from pneumarm.experiments.verdict import FEWEST_ARMS
+from pneumarm.files import make_folder, read_bytes, read_json, write_bytes, write_json
+from pneumarm.progress import Display
+
+Size = Literal["pilot", "full"]
+ORDER = (
+    *("optimal-settings", "all-goals", "no-shaping", "switch-punishment", "goal-area", "displacement"),
+    *("transferability", "transfer", "long-training", "shaping-settings", "fine-tuning", "valves-closed"),
+    *("noise-for-transfer", "control-frequency", "state-history", "enough-data", "overnight"),
+    *("goal-pairs", "joint-exploration", "joint-agents", "hierarchy", "coupling", "joint-data"),
+    *("on-the-arm-only", "joint-data-long"),
+)
+"""Experiments, about the cheapest first."""
+KINDS = {
+    "thesis-like": ("virtual:seed={}", "virtual:joints=2,seed={}"),
+    "wide": ("virtual:wide,seed={}", ""),
+    "foreign physics": ("python:benchmarks.strangers:one_{}", "python:benchmarks.strangers:two_{}"),
+}
+"""Names of arms by their kind, of one joint and of two."""
+THESIS_LIKE = next(iter(KINDS))
+PLAN = "arms.json"
+_MOST = 40  # arms
+_HOURS: dict[Size, float] = {"pilot": 1.0, "full": 8.0}
+"""Processor time of an experiment on arms of a kind; no arm is begun that would exceed it."""
+
+
+class Sizes(NamedTuple):
+    """How much is run."""
+
+    size: Size
+    kinds: tuple[str, ...] = tuple(KINDS)
+    workers: int | None = None
+    dask: str | None = None
+    settings: LaboratorySettings = LaboratorySettings()
+
+
+def kind_of(arm: str) -> str:
+    """Return the kind of an arm by its name; arms of your own are a kind each."""
+    if arm.startswith("virtual"):
+        return "wide" if "wide" in arm else THESIS_LIKE
+    return "foreign physics" if "benchmarks.strangers" in arm else arm
+
+
+def arms_of(chosen: Experiment, kind: str, count: int) -> list[str]:
+    """Return the names of the first ``count`` arms of a ``kind`` with the joints that an experiment needs."""
+    name = KINDS[kind]["joints" in chosen.arms[0]]
+    return [name.format(number) for number in range(1, count + 1)] if name else []
+
+
+def run(sizes: Sizes, laboratory: Path, rows: Path, progress: Display, tell: Callable[[str], None]) -> None:
+    """Compute the rows that ``laboratory`` lacks and copy what is complete to the folder ``rows``; resumable.
+
+    What an arm cannot do is told, and left out.
+    """
+    compute = partial(sweep, workers=sizes.workers, dask=sizes.dask, progress=progress)
+    planned = plan(rows) if sizes.size == "full" else {}
+    for kind in sizes.kinds:
+        for name in ORDER:
+            chosen = experiment(name)
+            count = planned.get(name, {}).get(kind, FEWEST_ARMS) if sizes.size == "full" else FEWEST_ARMS
+            folder = laboratory / name
+            arms = arms_of(chosen, kind, count)
+            for before, arm in enumerate(arms):
+                spent = sum(row.seconds for row in read_trial_rows(folder / ROWS) if row.arm in arms[:before])
+                if spent * (1 + 1 / max(before, 1)) > 3600 * _HOURS[sizes.size]:
+                    tell(f"{name}: its time on {kind} arms is over, without {arm}")
+                    break
+                try:
+                    compute(chosen, laboratory, [arm], settings=sizes.settings)
+                except PneumarmError as error:
+                    tell(f"{name}: not on {arm}: {error}")
+            if (folder / ROWS).exists():
+                publish_rows(chosen, folder, rows)
+
+
+def publish_rows(chosen: Experiment, folder: Path, rows: Path) -> None:
+    """Copy to the folder ``rows`` the arms in the ``folder`` of an experiment that are complete."""
+    found = complete(chosen, read_trial_rows(folder / ROWS))
+    if found.rows:
+        make_folder(rows / chosen.name)
+        write_bytes(rows / chosen.name / ROWS, b"".join(msgspec.json.encode(row) + b"\n" for row in found.rows))
+        write_bytes(rows / chosen.name / SETTINGS, read_bytes(folder / SETTINGS, "settings of an experiment"))
+
+
+def complete(chosen: Experiment, rows: list[Row]) -> TrialRows:
+    """Return the ``rows`` of those arms that have all trials and runs of an experiment."""
+    keys = {row.key for row in rows}
+    wanted = [(trial, run) for trial in chosen.trials for run in range(1, chosen.runs + 1)]
+    whole = {row.arm for row in rows if all((row.arm, *one) in keys for one in wanted)}
+    return sorted_rows(row for row in rows if row.arm in whole and row.run <= chosen.runs)
+
+
+def results_by_kind(rows: Path) -> dict[str, dict[str, Results]]:
+    """Return what the published ``rows`` say, by kind of arm and experiment."""
+    found: dict[str, dict[str, Results]] = {kind: {} for kind in KINDS}
+    for name in ORDER:
+        chosen, every = experiment(name), read_trial_rows(rows / name / ROWS)
+        for kind in sorted({kind_of(row.arm) for row in every}):
+            part = sorted_rows(row for row in every if kind_of(row.arm) == kind)
+            found.setdefault(kind, {})[name] = Results.of(chosen, part, chosen.analyse(part))
+    return found
+
+
+def plan(rows: Path) -> dict[str, dict[str, int]]:
+    """Return how many arms each experiment takes by kind, as its pilot says; written once and never changed."""
+    if not (rows / PLAN).exists():
+        planned: dict[str, dict[str, int]] = {}
+        for kind, found in results_by_kind(rows).items():
+            for name, results in found.items():
+                needed = [claim.arms for claim in results.claims]
+                planned.setdefault(name, {})[kind] = max(len(results.arms), min(_MOST, max(needed, default=0)))
+        make_folder(rows)
+        write_json(rows / PLAN, planned)
+    return msgspec.convert(read_json(rows / PLAN, "arms that were planned"), dict[str, dict[str, int]])

@@ -15,7 +15,8 @@ from pathlib import Path
 
 from pneumarm.experiments.claims import HEADER, Judged, evidence, judge, multiplicity, summary
 from pneumarm.experiments.claims.pictures import overview, strip
-from pneumarm.experiments.claims.running import THESIS_LIKE, results_by_kind
+from pneumarm.experiments.claims.replica import replica
+from pneumarm.experiments.claims.running import THESIS_LIKE, results_of, rows_by_kind
 from pneumarm.experiments.results import RULES
 from pneumarm.experiments.verdict import VERDICTS
 from pneumarm.files import make_folder, write_text
@@ -98,9 +99,9 @@ def believed(judged: Sequence[Judged]) -> tuple[list[str], list[str]]:
 
 def publish(folder: Path) -> list[str]:
     """Write the page and its pictures to ``folder`` from the rows in it; return the keys of :func:`believed`."""
-    results = results_by_kind(folder / ROWS)
-    judged = judge(results[THESIS_LIKE])
-    kinds = {kind: judge(found) for kind, found in results.items() if kind != THESIS_LIKE and found}
+    rows = rows_by_kind(folder / ROWS)
+    judged = judge(results_of(rows[THESIS_LIKE]))
+    kinds = {kind: judge(results_of(found)) for kind, found in rows.items() if kind != THESIS_LIKE and found}
     paragraphs, others = believed(judged)
     make_folder(folder / PICTURES)
     for old in (folder / PICTURES).glob("*.svg"):
@@ -121,6 +122,13 @@ def publish(folder: Path) -> list[str]:
             )
         linked = [each.conclusion.key for each in judged] if key == _CHART else []
         lines += [_table(table, linked) for table in section.tables]
+    if (last := replica(rows[THESIS_LIKE])) is not None:
+        lines += [
+            '<a id="replica"></a>',
+            f"## {last.title}",
+            *last.text,
+            *(_table(table, []) for table in last.tables),
+        ]
     write_text(folder / PAGE, "\n\n".join(lines) + "\n")
     return others
 

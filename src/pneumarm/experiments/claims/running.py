@@ -5,7 +5,8 @@ how many arms each experiment needs (:meth:`.Criterion.arms_needed`); these numb
 before any further row is computed, so that nobody stops where it pleases. The **full** size takes that many.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Literal, NamedTuple
@@ -13,12 +14,14 @@ from typing import Literal, NamedTuple
 import msgspec
 
 from pneumarm.errors import PneumarmError
+from pneumarm.experiments.claims.replica import by_test, chosen_test
 from pneumarm.experiments.experiment import Experiment, LaboratorySettings, Row, TrialRows, sorted_rows
 from pneumarm.experiments.preparation import SETTINGS
 from pneumarm.experiments.registry import experiment
 from pneumarm.experiments.results import Results
 from pneumarm.experiments.row_file import read_trial_rows
 from pneumarm.experiments.sweep import ROWS, sweep
+from pneumarm.experiments.trainings import Trainings
 from pneumarm.experiments.verdict import FEWEST_ARMS
 from pneumarm.files import make_folder, read_bytes, read_json, write_bytes, write_json
 from pneumarm.progress import Display
@@ -29,7 +32,7 @@ ORDER = (
     *("transferability", "transfer", "long-training", "shaping-settings", "fine-tuning", "valves-closed"),
     *("noise-for-transfer", "control-frequency", "state-history", "enough-data", "overnight"),
     *("goal-pairs", "joint-exploration", "joint-agents", "hierarchy", "coupling", "joint-data"),
-    *("on-the-arm-only", "joint-data-long"),
+    *("calibration", "on-the-arm-only", "joint-data-long"),
 )
 """Experiments, about the cheapest first."""
 KINDS = {
@@ -80,6 +83,7 @@ def run(sizes: Sizes, laboratory: Path, rows: Path, progress: Display, tell: Cal
             chosen = experiment(name)
             count = planned.get(name, {}).get(kind, FEWEST_ARMS) if sizes.size == "full" else FEWEST_ARMS
             folder = laboratory / name
+            settings = replace(sizes.settings, exploring=isinstance(chosen, Trainings))
             arms = arms_of(chosen, kind, count)
             for before, arm in enumerate(arms):
                 spent = sum(row.seconds for row in read_trial_rows(folder / ROWS) if row.arm in arms[:before])
@@ -87,7 +91,7 @@ def run(sizes: Sizes, laboratory: Path, rows: Path, progress: Display, tell: Cal
                     tell(f"{name}: its time on {kind} arms is over, without {arm}")
                     break
                 try:
-                    compute(chosen, laboratory, [arm], settings=sizes.settings)
+                    compute(chosen, laboratory, [arm], settings=settings)
                 except PneumarmError as error:
                     tell(f"{name}: not on {arm}: {error}")
             if (folder / ROWS).exists():
@@ -111,23 +115,31 @@ def complete(chosen: Experiment, rows: list[Row]) -> TrialRows:
     return sorted_rows(row for row in rows if row.arm in whole and row.run <= chosen.runs)
 
 
-def results_by_kind(rows: Path) -> dict[str, dict[str, Results]]:
-    """Return what the published ``rows`` say, by kind of arm and experiment."""
-    found: dict[str, dict[str, Results]] = {kind: {} for kind in KINDS}
+def rows_by_kind(rows: Path) -> dict[str, dict[str, TrialRows]]:
+    """Return the published ``rows`` by kind of arm and experiment."""
+    found: dict[str, dict[str, TrialRows]] = {kind: {} for kind in KINDS}
     for name in ORDER:
-        chosen, every = experiment(name), read_trial_rows(rows / name / ROWS)
+        every = read_trial_rows(rows / name / ROWS)
         for kind in sorted({kind_of(row.arm) for row in every}):
-            part = sorted_rows(row for row in every if kind_of(row.arm) == kind)
-            found.setdefault(kind, {})[name] = Results.of(chosen, part, chosen.analyse(part))
+            found.setdefault(kind, {})[name] = sorted_rows(row for row in every if kind_of(row.arm) == kind)
     return found
+
+
+def results_of(rows: Mapping[str, TrialRows]) -> dict[str, Results]:
+    """Return what the ``rows`` of experiments say, by the test of trainings that is the thesis'."""
+    test, results = chosen_test(rows), {}
+    for name, found in rows.items():
+        made, as_theirs = experiment(name), by_test(found, test)
+        results[name] = Results.of(made, as_theirs, made.analyse(as_theirs))
+    return results
 
 
 def plan(rows: Path) -> dict[str, dict[str, int]]:
     """Return how many arms each experiment takes by kind, as its pilot says; written once and never changed."""
     if not (rows / PLAN).exists():
         planned: dict[str, dict[str, int]] = {}
-        for kind, found in results_by_kind(rows).items():
-            for name, results in found.items():
+        for kind, found in rows_by_kind(rows).items():
+            for name, results in results_of(found).items():
                 needed = [claim.arms for claim in results.claims]
                 planned.setdefault(name, {})[kind] = max(len(results.arms), min(_MOST, max(needed, default=0)))
         make_folder(rows)

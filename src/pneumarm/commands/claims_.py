@@ -6,9 +6,9 @@ from rich.table import Table
 
 from pneumarm.commands.common import Json
 from pneumarm.console import say, show
-from pneumarm.experiments.claims import HEADER, Judged, claims_figures, evidence, judge, read_all_results, summary
-from pneumarm.experiments.claims.page import PAGE, ROWS, TITLE, publish, sections
-from pneumarm.experiments.claims.running import Size, Sizes, run
+from pneumarm.experiments.claims import HEADER, Judged, claims_figures, evidence, summary
+from pneumarm.experiments.claims.page import PAGE, ROWS, TITLE, judged_rows, publish, sections
+from pneumarm.experiments.claims.running import Size, Sizes, rows_by_kind, run
 from pneumarm.files import write_text
 from pneumarm.progress import progress
 from pneumarm.report.page import render
@@ -27,7 +27,7 @@ def claims_(
 ) -> None:
     """Show what the thesis claims beside what was found here, and write a page of it.
 
-    Everything is taken from the experiments of a laboratory; those without results are named. With --size all are
+    Everything is taken from the rows of a laboratory; experiments without rows are named. With --size all are
     run first, on arms like the thesis', far from it, and of other physics; a second call goes on from there.
 
     Parameters
@@ -50,9 +50,9 @@ def claims_(
         say(f"page: {published / PAGE}")
         if others:
             say(f"believe.toml: the rows say otherwise of {', '.join(sorted(set(others)))}; write these anew")
-    judged = judge(read_all_results(out))
+    judged, kinds = judged_rows(rows_by_kind(out))
     page = out / HTML
-    write_text(page, render(TITLE, summary(judged), sections(judged)))
+    write_text(page, render(TITLE, summary(judged), sections(judged, kinds)))
     show({**claims_figures(judged), "page": str(page)}, json, lambda: [*_tables(judged), *summary(judged)])
     say(f"page: {page}")
 

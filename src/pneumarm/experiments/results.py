@@ -1,18 +1,16 @@
 """What an experiment leaves: its page and its results as JSON, from the rows and what was recorded of its arms."""
 
-import math
 import re
 from collections.abc import Sequence
 from pathlib import Path
-
-import msgspec
+from typing import Any, NamedTuple
 
 from pneumarm.console import jsonable
 from pneumarm.errors import UnusableInput
 from pneumarm.experiments.experiment import Analysis, Claim, Experiment, TrialRows
 from pneumarm.experiments.preparation import SETTINGS, STORE
 from pneumarm.experiments.sweep import arm_folder
-from pneumarm.experiments.verdict import Criterion, Interval, Verdict, counted
+from pneumarm.experiments.verdict import counted
 from pneumarm.files import read_json, write_json, write_text
 from pneumarm.report.page import Section, Table, render
 from pneumarm.report.playing import playing
@@ -31,73 +29,14 @@ _SHOWN = 12.0
 """Seconds of an arm's recording that the page plays."""
 
 
-class Part(msgspec.Struct, frozen=True):
-    """One of the figures that a claim is judged by; what is not finite is None."""
-
-    name: str
-    mean: float | None
-    half: float | None
-    median: tuple[float | None, float | None] | None
-    """The median of each arm's runs and half its interval."""
-
-    @classmethod
-    def of(cls, name: str, one: Interval) -> "Part":
-        """Return the part of an interval."""
-        ends = (one.mean, one.half, *(one.median[:2] if one.median else ()))
-        mean, half, *median = (x if math.isfinite(x) else None for x in ends)
-        return cls(name, mean, half, (median[0], median[1]) if median else None)
-
-
-class FoundClaim(msgspec.Struct, frozen=True):
-    """A claim in ``results.json``."""
-
-    claim: str
-    thesis: str
-    ours: str
-    about: str
-    stated: str
-    medians: str
-    verdict: Verdict
-    why: str
-    arms: int
-    """That would decide it."""
-    p: float
-    criterion: Criterion
-    parts: tuple[Part, ...]
-
-    @classmethod
-    def of(cls, claim: Claim) -> "FoundClaim":
-        """Return what is kept of a ``claim``."""
-        text, thesis, ours = (_HYPHEN.sub("−", one) for one in (claim.text, claim.thesis, claim.ours))
-        parts = tuple(Part.of(name, one) for name, one in claim.criterion.parts(claim.found).items())
-        words = claim.about, claim.criterion.stated(), claim.medians
-        verdict, why, arms, p = claim.judgement
-        return cls(text, thesis, ours, *words, verdict, why, arms, p, claim.criterion, parts)
-
-    @property
-    def short(self) -> str:
-        """Its verdict, and how many arms would decide it."""
-        return f"{self.verdict} ({self.arms:,} arms would)" if self.arms else self.verdict
-
-    @property
-    def explained(self) -> str:
-        """Its verdict with its reason."""
-        return f"{self.verdict}: {self.why}" if self.why else self.verdict
-
-
-class Results(msgspec.Struct, frozen=True):
-    """The part of ``results.json`` that claims rest on."""
+class Results(NamedTuple):
+    """What the rows of an experiment say of the thesis."""
 
     experiment: str
     arms: tuple[str, ...]
     runs: int
     """On each arm."""
-    claims: tuple[FoundClaim, ...]
-
-    @classmethod
-    def of(cls, experiment: Experiment, rows: TrialRows, analysis: Analysis) -> "Results":
-        """Return what an ``analysis`` of ``rows`` found."""
-        return cls(experiment.name, rows.arms, rows.runs, tuple(map(FoundClaim.of, analysis.claims)))
+    claims: tuple[Claim, ...]
 
     @property
     def sample(self) -> str:
@@ -105,17 +44,31 @@ class Results(msgspec.Struct, frozen=True):
         return f"{_many(len(self.arms), 'arm')}, {_many(len(self.arms) * self.runs, 'run')}"
 
 
+def claim_row(claim: Claim) -> list[str]:
+    """Return a ``claim`` as a line of a table: itself, stated beforehand, thesis, ours, by the medians, verdict."""
+    cells = claim.text, claim.criterion.stated(), claim.thesis, claim.ours, claim.medians, claim.explained
+    return [_HYPHEN.sub("−", cell) for cell in cells]
+
+
+def claim_figures(claim: Claim) -> dict[str, Any]:
+    """Return a ``claim`` for programs."""
+    names = ("claim", "stated", "thesis", "ours", "medians")
+    return {**dict(zip(names, claim_row(claim), strict=False)), "about": claim.about, **claim.judgement._asdict()}
+
+
 def write_page(experiment: Experiment, folder: Path, analysis: Analysis, rows: TrialRows) -> Path:
     """Write ``page.html`` and ``results.json`` to ``folder``, one of a laboratory; return the path of the page."""
-    results, arms, runs = Results.of(experiment, rows, analysis), rows.arms, rows.runs
-    write_json(folder / RESULTS, jsonable({**analysis.figures, **msgspec.to_builtins(results)}))
+    arms, runs = rows.arms, rows.runs
+    of = {"experiment": experiment.name, "arms": list(arms), "runs": runs}
+    claims = [claim_figures(claim) for claim in analysis.claims]
+    write_json(folder / RESULTS, jsonable({**analysis.figures, **of, "claims": claims}))
     of_trials = f"{_many(runs, 'run')} of {_many(len(experiment.trials), 'trial')}"
     where = f"{experiment.words.source}. {of_trials} on {_listed(arms)}."
     sections = [*analysis.sections]
     summary = [*analysis.summary, where]
     if analysis.claims:
         summary.insert(0, f"{counted([c.verdict for c in analysis.claims], 'claim').capitalize()}.")
-        lines = [(c.claim, c.stated, c.thesis, c.ours, c.medians, c.explained) for c in results.claims]
+        lines = [claim_row(claim) for claim in analysis.claims]
         header = ["claim", "stated beforehand", "thesis", "here", "by the medians", "verdict"]
         table = Table(header, lines, "What the thesis found, and what holds here.", words=True)
         sections.insert(0, Section("Claims", [RULES], tables=[table]))

@@ -1,9 +1,9 @@
-"""The thesis' conclusions and what holds here, from the results of a laboratory's experiments.
+"""The thesis' conclusions and what holds here, from the rows of a laboratory's experiments.
 
     pneumarm claims --out laboratory
 
-``conclusions.toml`` says what the thesis concludes and which experiments test it; what an experiment finds is in its
-``results.json``. Nothing is run: an experiment without results is listed with the command that makes them.
+``conclusions.toml`` says what the thesis concludes and which experiments test it; what the rows of an experiment
+say of it is judged by the rules of today, whichever version computed them (:mod:`.running`, :mod:`.page`).
 
 How claims are judged, and add up to the verdict on a conclusion, says :mod:`~pneumarm.experiments.verdict`. What was
 not run counts as undecided.
@@ -13,16 +13,14 @@ import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
-from pathlib import Path
 from typing import Any
 
 import msgspec
 
-from pneumarm.errors import UnusableInput
+from pneumarm.experiments.experiment import Claim
 from pneumarm.experiments.registry import PLACES, experiment
-from pneumarm.experiments.results import RESULTS, FoundClaim, Results
+from pneumarm.experiments.results import Results, claim_figures, claim_row
 from pneumarm.experiments.verdict import FEWEST_ARMS, OPEN, VERDICTS, Verdict, counted, holm, together
-from pneumarm.files import read_bytes
 
 
 class Conclusion(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -44,7 +42,7 @@ class Judged:
     """A conclusion with the claims that were found on it."""
 
     conclusion: Conclusion
-    claims: tuple[tuple[Results, FoundClaim], ...]
+    claims: tuple[tuple[Results, Claim], ...]
     missing: tuple[str, ...]
     """Experiments that have no results yet."""
 
@@ -56,7 +54,7 @@ class Judged:
     @property
     def parts(self) -> Mapping[str, tuple[str, ...]]:
         """Its claims by their verdict."""
-        found = {v: tuple(c.claim for _, c in self.claims if c.verdict == v) for v in VERDICTS}
+        found = {v: tuple(c.text for _, c in self.claims if c.verdict == v) for v in VERDICTS}
         return {v: these for v, these in found.items() if these}
 
     @property
@@ -71,7 +69,7 @@ class Judged:
             said.append(f"Nothing was found that bears on it; {FEWEST_ARMS} arms at least are needed.")
         if self.missing:
             said.append(f"Not run: {', '.join(self.missing)}; {FEWEST_ARMS} arms at least are needed.")
-        if needed := max((claim.arms for _, claim in self.claims), default=0):
+        if needed := max((claim.judgement.arms for _, claim in self.claims), default=0):
             said.append(f"{needed:,} arms would decide all that is open, by the spread found.")
         said += [f"What would decide it: {self.conclusion.lacks}."] if self.conclusion.lacks else []
         return " ".join([f"Verdict: {self.verdict}.", *said])
@@ -86,31 +84,6 @@ def conclusions() -> tuple[Conclusion, ...]:
 def keys_of(experiment: str) -> frozenset[str]:
     """Return the keys of the conclusions that an experiment tests."""
     return frozenset(each.key for each in conclusions() if experiment in each.experiments)
-
-
-def read_all_results(laboratory: Path) -> dict[str, Results]:
-    """Return the results of all experiments in the folder ``laboratory``, by name.
-
-    Raises:
-        UnusableInput: there is no such folder, no experiment was finished in it, or a file in it is not what an
-            experiment leaves.
-
-    """
-    if not laboratory.is_dir():
-        raise UnusableInput(f"{laboratory}: expected the folder of a laboratory; run an experiment with --out first")
-    found = {}
-    for path in sorted(laboratory.glob(f"*/{RESULTS}")):
-        try:
-            results = msgspec.json.decode(read_bytes(path, "results of an experiment"), type=Results)
-        except (msgspec.DecodeError, RecursionError) as error:
-            raise UnusableInput(f"{path}: expected results of an experiment ({error}); run it again") from error
-        found[results.experiment] = results
-    if not found:
-        raise UnusableInput(
-            f"{laboratory}: expected experiments with results; finish one first, as by pneumarm experiment "
-            f"{next(iter(PLACES))} --out {laboratory}"
-        )
-    return found
 
 
 def judge(results: Mapping[str, Results]) -> list[Judged]:
@@ -152,14 +125,14 @@ def summary(judged: Sequence[Judged]) -> list[str]:
     return [f"{said}. They rest on {of}. All of it is made from the results of the experiments.", *speaks]
 
 
-def _all_claims(judged: Sequence[Judged]) -> list[tuple[Results, FoundClaim]]:
+def _all_claims(judged: Sequence[Judged]) -> list[tuple[Results, Claim]]:
     return [pair for each in judged for pair in each.claims]
 
 
 def multiplicity(judged: Sequence[Judged]) -> str:
     """Return in words how many claims are judged, and how many verdicts stand when all are to be right at once."""
     decided = [claim for _, claim in _all_claims(judged) if claim.verdict in ("holds", "does not hold")]
-    stand = sum(holm([claim.p for claim in decided]))
+    stand = sum(holm([claim.judgement.p for claim in decided]))
     return (
         f"{len(_all_claims(judged))} claims are judged one by one, each with an error of 2.5 %: of forty that chance "
         f"alone decides one is wrong. Of the {len(decided)} that hold or are refuted {stand} also stand by their "
@@ -173,10 +146,11 @@ HEADER = ("claim", "thesis", "here, with 95 % intervals", "from", "verdict")
 
 def evidence(judged: Judged) -> list[list[str]]:
     """Return a line for each claim, by :data:`HEADER`: thesis beside ours, arms and runs, verdict."""
-    return [
-        [claim.claim, claim.thesis, claim.ours, f"{results.experiment}: {results.sample}", claim.short]
-        for results, claim in judged.claims
-    ]
+    lines = []
+    for results, claim in judged.claims:
+        text, _, thesis, ours, _, _ = claim_row(claim)
+        lines.append([text, thesis, ours, f"{results.experiment}: {results.sample}", claim.short])
+    return lines
 
 
 def claims_figures(judged: Sequence[Judged]) -> dict[str, Any]:
@@ -190,7 +164,7 @@ def claims_figures(judged: Sequence[Judged]) -> dict[str, Any]:
                 "missing": list(each.missing),
                 "claims": [
                     {
-                        **msgspec.to_builtins(claim),
+                        **claim_figures(claim),
                         "arms": len(results.arms),
                         "runs": len(results.arms) * results.runs,
                     }

@@ -13,11 +13,11 @@ from collections.abc import Mapping, Sequence
 from importlib import resources
 from pathlib import Path
 
-from pneumarm.experiments.claims import HEADER, Judged, evidence, judge, multiplicity, summary
+from pneumarm.experiments.claims import HEADER, Judged, judge, multiplicity, summary
 from pneumarm.experiments.claims.pictures import overview, strip
 from pneumarm.experiments.claims.replica import replica
-from pneumarm.experiments.claims.running import THESIS_LIKE, results_of, rows_by_kind
-from pneumarm.experiments.results import RULES
+from pneumarm.experiments.claims.running import THESIS_LIKE, RowsByKind, results_of, rows_by_kind
+from pneumarm.experiments.results import RULES, claim_row
 from pneumarm.experiments.verdict import VERDICTS
 from pneumarm.files import make_folder, write_text
 from pneumarm.report.page import Picture, Section, Table
@@ -62,12 +62,10 @@ def _counted(judged: Sequence[Judged]) -> str:
 
 def _evidence(judged: Judged, kinds: Mapping[str, Judged]) -> Section:
     header = [HEADER[0], "stated beforehand", *HEADER[1:3], "by the medians", *HEADER[3:]]
-    lines = [
-        [f"{number}. {text}", claim.stated, thesis, ours, claim.medians, sample, claim.explained]
-        for number, ((text, thesis, ours, sample, _), (_, claim)) in enumerate(
-            zip(evidence(judged), judged.claims, strict=True), 1
-        )
-    ]
+    lines = []
+    for number, (results, claim) in enumerate(judged.claims, 1):
+        words, *cells, verdict = claim_row(claim)
+        lines.append([f"{number}. {words}", *cells, f"{results.experiment}: {results.sample}", verdict])
     of = judged.conclusion
     run = " && ".join(f"pneumarm experiment {name} --out laboratory" for name in of.experiments)
     text = [f"Thesis section {of.section.removeprefix('Thesis section ')}. {judged.explained()}"]
@@ -97,11 +95,17 @@ def believed(judged: Sequence[Judged]) -> tuple[list[str], list[str]]:
     return paragraphs, others
 
 
+def judged_rows(rows: RowsByKind) -> tuple[list[Judged], dict[str, list[Judged]]]:
+    """Return the conclusions as arms like the thesis' have them, or the first kind there is, and as the others do."""
+    found = {kind: judge(results_of(of_kind)) for kind, of_kind in rows.items()}
+    main = THESIS_LIKE if THESIS_LIKE in found else next(iter(found))
+    return found.pop(main), found
+
+
 def publish(folder: Path) -> list[str]:
     """Write the page and its pictures to ``folder`` from the rows in it; return the keys of :func:`believed`."""
     rows = rows_by_kind(folder / ROWS)
-    judged = judge(results_of(rows[THESIS_LIKE]))
-    kinds = {kind: judge(results_of(found)) for kind, found in rows.items() if kind != THESIS_LIKE and found}
+    judged, kinds = judged_rows(rows)
     paragraphs, others = believed(judged)
     make_folder(folder / PICTURES)
     for old in (folder / PICTURES).glob("*.svg"):
@@ -122,7 +126,7 @@ def publish(folder: Path) -> list[str]:
             )
         linked = [each.conclusion.key for each in judged] if key == _CHART else []
         lines += [_table(table, linked) for table in section.tables]
-    if (last := replica(rows[THESIS_LIKE])) is not None:
+    if (last := replica(rows.get(THESIS_LIKE, {}))) is not None:
         lines += [
             '<a id="replica"></a>',
             f"## {last.title}",

@@ -7,8 +7,8 @@ from html import escape
 
 from pneumarm.drawing.colours import DARK, GREY, INK, LIGHT, MIDDLE
 from pneumarm.experiments.claims import Judged
-from pneumarm.experiments.results import FoundClaim, Part
-from pneumarm.experiments.verdict import OPEN, Verdict
+from pneumarm.experiments.experiment import Claim
+from pneumarm.experiments.verdict import OPEN, Interval, Verdict
 
 COLOURS: dict[Verdict, str] = {"holds": DARK, "in part": LIGHT, "does not hold": MIDDLE, OPEN: GREY}
 """They differ in lightness too."""
@@ -45,19 +45,21 @@ def strip(judged: Judged) -> str:
     claim has figures.
     """
     parts = [
-        (number, claim, part)
+        (number, claim, name, one)
         for number, (_, claim) in enumerate(judged.claims, 1)
-        for part in claim.parts
-        if part.mean is not None
+        for name, one in claim.criterion.parts(claim.found).items()
+        if one.samples
     ]
     body = [text for place, one in enumerate(parts) for text in _part(_PART * place, *one)]
     return _svg(_PART * len(parts) + 4, body, f"Claims on: {judged.conclusion.says}") if parts else ""
 
 
-def _part(y: float, number: int, claim: FoundClaim, part: Part) -> Iterator[str]:
-    bounds = claim.criterion.bounds
-    spans = [span for span in (_span((part.mean, part.half)), part.median and _span(part.median)) if span]
-    ends = [x for x in (*bounds, *claim.criterion.refuting) if math.isfinite(x)] + [x for span in spans for x in span]
+def _part(y: float, number: int, claim: Claim, name: str, one: Interval) -> Iterator[str]:
+    bounds, colour = claim.criterion.bounds, COLOURS[claim.verdict]
+    drawn = {"mean": one} | ({"median": one.median} if one.median else {})
+    halves = {which: each.half if math.isfinite(each.half) else 0.0 for which, each in drawn.items()}
+    ends = [x for x in (*bounds, *claim.criterion.refuting) if math.isfinite(x)]
+    ends += [each.mean + sign * halves[which] for which, each in drawn.items() for sign in (-1, 1)]
     low, high = min(ends), max(ends)
     margin = _MARGIN * (high - low or abs(high) or 1)
 
@@ -66,19 +68,16 @@ def _part(y: float, number: int, claim: FoundClaim, part: Part) -> Iterator[str]
         return round(_LEFT + _PLOT * min(max(share, 0), 1), 2)
 
     left, right = (at(x) for x in bounds)
-    named = f"{number}" if len(claim.parts) == 1 else f"{number} {part.name}"
+    named = f"{number}" if len(claim.criterion.parts(claim.found)) == 1 else f"{number} {name}"
     yield f'<g data-claim="{number}" data-verdict="{claim.verdict}">'
     yield _text(4, y + 20, named if len(named) < _WORDS else f"{named[: _WORDS - 2]}…")
     yield f'<rect x="{left}" y="{y + 4}" width="{round(right - left, 2)}" height="26" fill="#dbe8f0"/>'
-    colour = COLOURS[claim.verdict]
-    for name, pair, where in (("mean", (part.mean, part.half), y + 12), ("median", part.median, y + 23)):
-        if not pair or (span := _span(pair)) is None or pair[0] is None:
-            continue
-        x1, x2 = (at(x) for x in span)
-        fill = colour if name == "mean" else "white"
-        yield _line(x1, where, x2, where, f'class="{name}" stroke="{colour}" stroke-width="2"')
-        yield f'<circle cx="{at(pair[0])}" cy="{where}" r="4" fill="{fill}" stroke="{colour}"/>'
-        yield _text(_LEFT + _PLOT + 10, where + 4, f"{name} {number_of(*pair)}")
+    for which, each in drawn.items():
+        where, fill = (y + 12, colour) if which == "mean" else (y + 23, "white")
+        x1, x2 = at(each.mean - halves[which]), at(each.mean + halves[which])
+        yield _line(x1, where, x2, where, f'class="{which}" stroke="{colour}" stroke-width="2"')
+        yield f'<circle cx="{at(each.mean)}" cy="{where}" r="4" fill="{fill}" stroke="{colour}"/>'
+        yield _text(_LEFT + _PLOT + 10, where + 4, f"{which} {number_of(each.mean, halves[which])}")
     for x in bounds:
         if math.isfinite(x):
             yield _line(at(x), y + 2, at(x), y + 32, f'stroke="{INK}" stroke-dasharray="3 2"')
@@ -86,20 +85,11 @@ def _part(y: float, number: int, claim: FoundClaim, part: Part) -> Iterator[str]
     yield "</g>"
 
 
-def _span(pair: tuple[float | None, float | None]) -> tuple[float, float] | None:
-    """Return the ends of a mean with half its interval, the mean alone where it has none."""
-    mean, half = pair
-    return None if mean is None else (mean - (half or 0), mean + (half or 0))
-
-
-def number_of(mean: float | None, half: float | None) -> str:
-    """Return a mean with half its interval, to three digits of the larger."""
-    if mean is None:
-        return "none"
-    largest = max(abs(mean), half or 0)
+def number_of(mean: float, half: float) -> str:
+    """Return a mean with half its interval, 0 where it has none, to three digits of the larger."""
+    largest = max(abs(mean), half)
     digits = max(0, _DIGITS - 1 - math.floor(math.log10(largest))) if largest else 1
-    said = f"{mean:+z,.{digits}f}" + ("" if half is None else f" ± {half:,.{digits}f}")
-    return said.replace("-", "−")
+    return f"{mean:+z,.{digits}f}".replace("-", "−") + (f" ± {half:,.{digits}f}" if half else "")
 
 
 def _line(x1: float, y1: float, x2: float, y2: float, style: str) -> str:

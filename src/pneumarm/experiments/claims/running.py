@@ -5,7 +5,7 @@ how many arms each experiment needs (:meth:`.Criterion.arms_needed`); these numb
 before any further row is computed, so that nobody stops where it pleases. The **full** size takes that many.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -13,7 +13,7 @@ from typing import Literal, NamedTuple
 
 import msgspec
 
-from pneumarm.errors import PneumarmError
+from pneumarm.errors import PneumarmError, UnusableInput
 from pneumarm.experiments.claims.replica import by_test, chosen_test
 from pneumarm.experiments.experiment import Experiment, LaboratorySettings, Row, TrialRows, sorted_rows
 from pneumarm.experiments.preparation import SETTINGS
@@ -42,6 +42,8 @@ KINDS = {
 }
 """Names of arms by their kind, of one joint and of two."""
 THESIS_LIKE = next(iter(KINDS))
+RowsByKind = Mapping[str, Mapping[str, TrialRows]]
+"""Rows by kind of arm and experiment."""
 PLAN = "arms.json"
 _MOST = 40  # arms
 _HOURS: dict[Size, float] = {"pilot": 1.0, "full": 8.0}
@@ -59,10 +61,10 @@ class Sizes(NamedTuple):
 
 
 def kind_of(arm: str) -> str:
-    """Return the kind of an arm by its name; arms of your own are a kind each."""
+    """Return the kind of an arm by its name."""
     if arm.startswith("virtual"):
         return "wide" if "wide" in arm else THESIS_LIKE
-    return "foreign physics" if "benchmarks.strangers" in arm else arm
+    return "foreign physics" if "benchmarks.strangers" in arm else "your own"
 
 
 def arms_of(chosen: Experiment, kind: str, count: int) -> list[str]:
@@ -107,21 +109,33 @@ def publish_rows(chosen: Experiment, folder: Path, rows: Path) -> None:
         write_bytes(rows / chosen.name / SETTINGS, read_bytes(folder / SETTINGS, "settings of an experiment"))
 
 
-def complete(chosen: Experiment, rows: list[Row]) -> TrialRows:
-    """Return the ``rows`` of those arms that have all trials and runs of an experiment."""
-    keys = {row.key for row in rows}
-    wanted = [(trial, run) for trial in chosen.trials for run in range(1, chosen.runs + 1)]
+def complete(chosen: Experiment, rows: Sequence[Row]) -> TrialRows:
+    """Return the ``rows`` of those arms that have all trials and runs, of an experiment or that there are."""
+    keys, runs = {row.key for row in rows}, min(chosen.runs, max((row.run for row in rows), default=0))
+    wanted = [(trial, run) for trial in chosen.trials for run in range(1, runs + 1)]
     whole = {row.arm for row in rows if all((row.arm, *one) in keys for one in wanted)}
-    return sorted_rows(row for row in rows if row.arm in whole and row.run <= chosen.runs)
+    return sorted_rows(row for row in rows if row.arm in whole and row.run <= runs)
 
 
-def rows_by_kind(rows: Path) -> dict[str, dict[str, TrialRows]]:
-    """Return the published ``rows`` by kind of arm and experiment."""
-    found: dict[str, dict[str, TrialRows]] = {kind: {} for kind in KINDS}
+def rows_by_kind(folder: Path) -> RowsByKind:
+    """Return the complete rows of the experiments in ``folder``, by kind of arm.
+
+    Raises:
+        UnusableInput: there is no such folder, or no rows are complete in it.
+
+    """
+    if not folder.is_dir():
+        raise UnusableInput(f"{folder}: expected the folder of a laboratory; run an experiment with --out first")
+    found: dict[str, dict[str, TrialRows]] = {}
     for name in ORDER:
-        every = read_trial_rows(rows / name / ROWS)
+        every = complete(experiment(name), read_trial_rows(folder / name / ROWS)).rows
         for kind in sorted({kind_of(row.arm) for row in every}):
             found.setdefault(kind, {})[name] = sorted_rows(row for row in every if kind_of(row.arm) == kind)
+    if not found:
+        raise UnusableInput(
+            f"{folder}: expected rows of experiments; finish one first, as by pneumarm experiment {ORDER[0]} "
+            f"--out {folder}"
+        )
     return found
 
 
@@ -130,7 +144,7 @@ def results_of(rows: Mapping[str, TrialRows]) -> dict[str, Results]:
     test, results = chosen_test(rows), {}
     for name, found in rows.items():
         made, as_theirs = experiment(name), by_test(found, test)
-        results[name] = Results.of(made, as_theirs, made.analyse(as_theirs))
+        results[name] = Results(name, found.arms, found.runs, tuple(made.analyse(as_theirs).claims))
     return results
 
 
@@ -140,7 +154,7 @@ def plan(rows: Path) -> dict[str, dict[str, int]]:
         planned: dict[str, dict[str, int]] = {}
         for kind, found in rows_by_kind(rows).items():
             for name, results in results_of(found).items():
-                needed = [claim.arms for claim in results.claims]
+                needed = [claim.judgement.arms for claim in results.claims]
                 planned.setdefault(name, {})[kind] = max(len(results.arms), min(_MOST, max(needed, default=0)))
         make_folder(rows)
         write_json(rows / PLAN, planned)

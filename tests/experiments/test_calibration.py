@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+import pytest
 from synthetic_arm import synthetic_simulation
 
 from pneumarm.experiments.all_goals import EXPERIMENT as ALL_GOALS
@@ -47,6 +48,7 @@ def test_choices_are_made_by_the_odd_trials() -> None:
     assert f"Nearest to the thesis in odd trials: {CALIBRATION.trials[5]}" in said
 
 
+@pytest.mark.thorough
 def test_every_choice_trains_all_trials(tmp_path: Path) -> None:
     small = LaboratorySettings(transitions=3_000, test_episodes=20, max_episodes=10)
     rows = sweep(CALIBRATION, tmp_path, ["virtual:seed=3"], 1, small).rows

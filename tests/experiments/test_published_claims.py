@@ -99,6 +99,7 @@ def test_every_experiment_has_its_turn_and_its_arms() -> None:
     assert kind_of("serial:/dev/ttyACM0") == "your own"
 
 
+@pytest.mark.thorough
 def test_a_pilot_goes_on_and_plans_the_full_size(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """An arm that was interrupted is not published; a second call computes it alone; the plan is never changed."""
     monkeypatch.setattr(running, "ORDER", (NAME,))
@@ -110,19 +111,22 @@ def test_a_pilot_goes_on_and_plans_the_full_size(tmp_path: Path, monkeypatch: py
     file = laboratory / NAME / ROW_FILE
     lines = file.read_text().splitlines(keepends=True)
     file.write_text("".join(lines[:-1]))
-    running.publish_rows(experiment(NAME), laboratory / NAME, rows)
+    running.publish_rows(laboratory, rows)
     assert {row.arm for row in read_trial_rows(rows / NAME / ROW_FILE)} == {"virtual:seed=1"}
     run(pilot, laboratory, rows, silent, told.append)
     published = read_trial_rows(rows / NAME / ROW_FILE)
     assert {row.arm for row in published} == {"virtual:seed=1", "virtual:seed=2"}
     assert file.read_text().startswith("".join(lines[:-1]))  # what was there is not computed again
     monkeypatch.setattr(running, "_MOST", 3)
-    run(pilot._replace(size="full"), laboratory, rows, silent, told.append)
+    another = tmp_path / "another"  # takes up what is published
+    run(pilot._replace(size="full"), another, rows, silent, told.append)
+    assert (another / NAME / ROW_FILE).read_text().startswith((laboratory / NAME / ROW_FILE).read_text()[:200])
     assert {row.arm for row in read_trial_rows(rows / NAME / ROW_FILE)} == {f"virtual:seed={n}" for n in (1, 2, 3)}
     assert running.plan(rows) == {NAME: {THESIS_LIKE: 3}}
     assert told == []
 
 
+@pytest.mark.thorough
 def test_no_arm_is_begun_when_the_time_is_over(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(running, "ORDER", (NAME,))
     monkeypatch.setattr(running, "_HOURS", {"pilot": 1e-9, "full": 1e-9})

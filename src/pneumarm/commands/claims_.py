@@ -8,7 +8,7 @@ from pneumarm.commands.common import Json
 from pneumarm.console import say, show
 from pneumarm.experiments.claims import HEADER, Judged, claims_figures, evidence, summary
 from pneumarm.experiments.claims.page import PAGE, ROWS, TITLE, judged_rows, publish, sections
-from pneumarm.experiments.claims.running import Size, Sizes, rows_by_kind, run
+from pneumarm.experiments.claims.running import Size, Sizes, publish_rows, rows_by_kind, run
 from pneumarm.files import write_text
 from pneumarm.progress import progress
 from pneumarm.report.page import render
@@ -37,7 +37,7 @@ def claims_(
     size
         Run all experiments: pilot on five arms of each kind, full on as many as the pilot says that it takes.
     published
-        Folder whose claims.md is made from the rows in its claims/rows; what --size runs is copied there.
+        Folder for claims.md, its pictures, and in claims/rows the rows of complete arms, which it is made of.
     workers
         Rows computed at once; by default as many as there are cores.
     dask
@@ -46,6 +46,7 @@ def claims_(
     if size is not None:
         run(Sizes(size, workers=workers, dask=dask), out, (published or out) / ROWS, progress, say)
     if published is not None:
+        publish_rows(out, published / ROWS)
         others = publish(published)
         say(f"page: {published / PAGE}")
         if others:

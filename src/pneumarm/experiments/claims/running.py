@@ -76,8 +76,11 @@ def arms_of(chosen: Experiment, kind: str, count: int) -> list[str]:
 def run(sizes: Sizes, laboratory: Path, rows: Path, progress: Display, tell: Callable[[str], None]) -> None:
     """Compute the rows that ``laboratory`` lacks and copy what is complete to the folder ``rows``; resumable.
 
-    What an arm cannot do is told, and left out.
+    What is published already is taken up, not computed again. What an arm cannot do is told, and left out.
     """
+    for name in ORDER:
+        if (rows / name / ROWS).exists() and not (laboratory / name / ROWS).exists():
+            _copy(name, read_trial_rows(rows / name / ROWS), rows, laboratory)
     compute = partial(sweep, workers=sizes.workers, dask=sizes.dask, progress=progress)
     planned = plan(rows) if sizes.size == "full" else {}
     for kind in sizes.kinds:
@@ -96,17 +99,21 @@ def run(sizes: Sizes, laboratory: Path, rows: Path, progress: Display, tell: Cal
                     compute(chosen, laboratory, [arm], settings=settings)
                 except PneumarmError as error:
                     tell(f"{name}: not on {arm}: {error}")
-            if (folder / ROWS).exists():
-                publish_rows(chosen, folder, rows)
+            publish_rows(laboratory, rows, (name,))
 
 
-def publish_rows(chosen: Experiment, folder: Path, rows: Path) -> None:
-    """Copy to the folder ``rows`` the arms in the ``folder`` of an experiment that are complete."""
-    found = complete(chosen, read_trial_rows(folder / ROWS))
-    if found.rows:
-        make_folder(rows / chosen.name)
-        write_bytes(rows / chosen.name / ROWS, b"".join(msgspec.json.encode(row) + b"\n" for row in found.rows))
-        write_bytes(rows / chosen.name / SETTINGS, read_bytes(folder / SETTINGS, "settings of an experiment"))
+def publish_rows(laboratory: Path, rows: Path, names: Sequence[str] = ORDER) -> None:
+    """Copy to the folder ``rows`` the arms of experiments in ``laboratory`` that are complete."""
+    for name in names:
+        if found := complete(experiment(name), read_trial_rows(laboratory / name / ROWS)).rows:
+            _copy(name, found, laboratory, rows)
+
+
+def _copy(name: str, found: Sequence[Row], source: Path, to: Path) -> None:
+    """Write the rows that were ``found`` of an experiment, with their settings, from one laboratory to another."""
+    make_folder(to / name)
+    write_bytes(to / name / ROWS, b"".join(msgspec.json.encode(row) + b"\n" for row in found))
+    write_bytes(to / name / SETTINGS, read_bytes(source / name / SETTINGS, "settings of an experiment"))
 
 
 def complete(chosen: Experiment, rows: Sequence[Row]) -> TrialRows:

@@ -5,7 +5,8 @@
     FOLDER/claims/rows/            the rows that it is made of, an experiment a folder, as in a laboratory
 
 ``believe.toml`` says in plain English what to believe of the thesis. Each of its paragraphs names the verdicts that
-it rests on and is left out where they are others, so that no sentence outlives its evidence.
+it rests on, of conclusions or of claims on them (``frequency.1``), and is left out where they are others, so that no
+sentence outlives its evidence.
 """
 
 import tomllib
@@ -86,10 +87,13 @@ def _evidence(judged: Judged, kinds: Mapping[str, Judged]) -> Section:
 def believed(judged: Sequence[Judged]) -> tuple[list[str], list[str]]:
     """Return the paragraphs of ``believe.toml`` that the verdicts support, and the keys whose verdict is another."""
     text = (resources.files(__package__) / "believe.toml").read_text(encoding="utf-8")
-    verdicts = {each.conclusion.key: each.verdict for each in judged}
+    verdicts: dict[str, str] = {each.conclusion.key: each.verdict for each in judged}
+    for each in judged:
+        found = enumerate(each.claims, 1)
+        verdicts |= {f"{each.conclusion.key}.{number}": claim.verdict for number, (_, claim) in found}
     paragraphs, others = [], []
     for one in tomllib.loads(text)["paragraphs"]:
-        wrong = [key for key, verdict in one["rests"].items() if verdicts[key] != verdict]
+        wrong = [key for key, verdict in one["rests"].items() if verdicts.get(key) != verdict]
         others += wrong
         paragraphs += [] if wrong else [" ".join(one["text"].split())]
     return paragraphs, others

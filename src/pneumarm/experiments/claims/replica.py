@@ -99,7 +99,7 @@ def _line(made: Factorial, rows: TrialRows, test: str) -> list[str]:
         for first in (0, 1)
     ]
     most = (math.sqrt(alpha(table)), math.sqrt(alpha(table) * alpha(by_arm)))
-    return [
+    cells = [
         made.name,
         TESTS[test],
         *halves,
@@ -108,3 +108,4 @@ def _line(made: Factorial, rows: TrialRows, test: str) -> list[str]:
         f"{rank_correlation(by_arm.mean(axis=1), table.mean(axis=1)):.2f}",
         *(f"{one:.2f}" for one in most),
     ]
+    return [cells[0], *(cell.replace("-", "−") for cell in cells[1:])]

@@ -65,7 +65,7 @@ class Judged:
     def explained(self) -> str:
         """Return the verdict in words, what it comes from where its claims differ, and what would decide the rest."""
         said = [f"{v.capitalize()}: {'; '.join(these)}." for v, these in self.parts.items() if len(self.parts) > 1]
-        if not self.claims and not self.conclusion.lacks:
+        if not (self.claims or self.missing or self.conclusion.lacks):
             said.append(f"Nothing was found that bears on it; {FEWEST_ARMS} arms at least are needed.")
         if self.missing:
             said.append(f"Not run: {', '.join(self.missing)}; {FEWEST_ARMS} arms at least are needed.")

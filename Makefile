@@ -9,7 +9,7 @@ READY := $(VENV)/.ready
 PYTHON311 ?= python3.11
 LOWEST := .venv-lowest
 
-.PHONY: setup run test test-all lint figures same bench held-out constants baselines soak mutants walk lowest site clean
+.PHONY: setup run test test-all lint figures same bench claims held-out constants baselines soak mutants walk lowest site clean
 
 setup: $(READY)
 
@@ -43,6 +43,9 @@ same: setup  ## whether results are those of another revision, byte for byte: ma
 
 bench: setup
 	$(BIN)/python -m benchmarks
+
+claims: setup  ## which of the thesis' conclusions hold: all experiments, and docs/claims.md from their rows; hours (SIZE=full: two nights), a second call goes on
+	$(BIN)/pneumarm claims --size $(or $(SIZE),pilot) --out runs/claims --published docs
 
 held-out: setup  ## the whole job on the ten held-out arms; takes about ten minutes
 	$(BIN)/python -m benchmarks held_out

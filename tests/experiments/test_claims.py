@@ -11,13 +11,16 @@ import pytest
 from pneumarm.cli import main
 from pneumarm.errors import UnusableInput
 from pneumarm.experiments.all_goals import EXPERIMENT as ALL_GOALS
-from pneumarm.experiments.claims import conclusions, judge, keys_of, read_all_results, sections, summary
+from pneumarm.experiments.claims import conclusions, judge, keys_of, summary
+from pneumarm.experiments.claims.page import sections
+from pneumarm.experiments.claims.running import rows_by_kind
 from pneumarm.experiments.experiment import Analysis, Claim, Row, TrialRows, sorted_rows
 from pneumarm.experiments.factorial import Factorial
 from pneumarm.experiments.registry import PLACES, experiment
-from pneumarm.experiments.results import write_page
+from pneumarm.experiments.results import Results, write_page
+from pneumarm.experiments.sweep import ROWS
 from pneumarm.experiments.switch_punishment import EXPERIMENT as PUNISHMENT
-from pneumarm.experiments.verdict import OPEN
+from pneumarm.experiments.verdict import OPEN, Criterion, Interval
 
 OF_THE_THESIS = {
     *("control-frequency", "state-history", "enough-data", "noise-for-transfer", "switch-punishment", "all-goals"),
@@ -27,17 +30,19 @@ OF_THE_THESIS = {
 }
 
 
-def results(folder: Path, name: str, claims: list[tuple[str, str]], arms: int = 5, runs: int = 4) -> None:
-    """Write the results of an experiment whose claims are about and have the verdict given."""
-    rest = {"thesis": "1", "ours": "2", "stated": "holds above 0", "medians": "3", "why": "", "p": 0.0001}
-    found = [{"claim": a, "verdict": v, "about": a, "arms": 9 * (v == OPEN), **rest} for a, v in claims]
-    (folder / name).mkdir(parents=True)
-    about = {"experiment": name, "arms": [f"arm {n}" for n in range(arms)], "runs": runs, "claims": found, "rows": 3}
-    (folder / name / "results.json").write_text(json.dumps(about))
+def results(name: str, claims: list[tuple[str, str]], arms: int = 5, runs: int = 4) -> dict[str, Results]:
+    """Return results of an experiment whose claims are about and have the verdict given; 9 arms would decide."""
+    below, above = Interval(-2.0, 0.5, 9, 9), Interval(2.0, 0.5, 9, 9)
+    open_ = Interval(0.0, 3.0, 5, 5)
+    found = {"holds": above, "does not hold": below, OPEN: open_}
+    stated = Criterion(above=0, matters=1)
+    made = tuple(Claim(about, "1", "2", about, stated, {"found": found[verdict]}) for about, verdict in claims)
+    assert [claim.verdict for claim in made] == [verdict for _, verdict in claims]
+    return {name: Results(name, tuple(f"arm {n}" for n in range(arms)), runs, made)}
 
 
-def judged(folder: Path) -> dict[str, Any]:
-    return {each.conclusion.key: each for each in judge(read_all_results(folder))}
+def judged(found: dict[str, Results]) -> dict[str, Any]:
+    return {each.conclusion.key: each for each in judge(found)}
 
 
 def test_every_conclusion_names_experiments_of_the_thesis() -> None:
@@ -54,16 +59,15 @@ def test_claims_are_about_all_conclusions_that_name_their_experiment(name: str) 
     assert {claim.about for claim in claims(made, rows(made, wobble))} == keys_of(name)
 
 
-def test_verdicts_add_up(tmp_path: Path) -> None:
+def test_verdicts_add_up() -> None:
     verdicts = [("sarsa", "holds"), ("sarsa", "holds"), ("neurons", "holds"), ("neurons", "does not hold")]
     verdicts += [("gamma", "does not hold"), ("gamma", OPEN), ("traces", OPEN), ("traces", "holds")]
-    results(tmp_path, "all-goals", verdicts)
-    results(tmp_path, "no-shaping", [("shaping-not-indispensable", OPEN)])
-    found = judged(tmp_path)
+    found = judged(results("all-goals", verdicts) | results("no-shaping", [("shaping-not-indispensable", OPEN)]))
     expected = {"sarsa": "holds", "neurons": "in part", "gamma": OPEN, "traces": "in part"}
     assert {key: found[key].verdict for key in expected} == expected
     assert found["learning-rate"].verdict == OPEN  # all-goals was run and said nothing of it
-    assert found["q-fluctuates"].verdict == "not run"
+    assert found["q-fluctuates"].verdict == OPEN
+    assert "Not run: long-training; 5 arms at least are needed." in found["q-fluctuates"].explained()
     both = found["shaping-not-indispensable"]
     assert len(both.claims) == 1
     assert both.missing == ("shaping-settings",)
@@ -71,28 +75,25 @@ def test_verdicts_add_up(tmp_path: Path) -> None:
     assert found["neurons"].explained() == "Verdict: in part. Holds: neurons. Does not hold: neurons."
 
 
-def test_what_no_experiment_decides_says_what_would(tmp_path: Path) -> None:
-    results(tmp_path, "all-goals", [("sarsa", "holds")])
-    made = judge(read_all_results(tmp_path))
+def test_what_no_experiment_decides_says_what_would() -> None:
+    made = judge(results("all-goals", [("sarsa", "holds")]))
     lacking = [each for each in made if not each.conclusion.experiments]
     assert len(lacking) >= 7
-    titles = {section.title: section.text[0] for section in sections(made, tmp_path)}
+    titles = {section.title: section.text[0] for section in sections(made)}
     for each in lacking:
         assert each.verdict == OPEN
-        assert titles[each.conclusion.says] == f"Verdict: {OPEN}. What would decide it: {each.conclusion.lacks}."
+        said = f"Verdict: {OPEN}. What would decide it: {each.conclusion.lacks}."
+        assert titles[each.conclusion.says] == f"Thesis section {each.conclusion.section}. {said}"
 
 
 def test_the_page_of_one_arm_speaks_of_it_alone(tmp_path: Path) -> None:
-    results(tmp_path, "all-goals", [("sarsa", OPEN)], arms=1)
-    made = judge(read_all_results(tmp_path))
+    made = judge(results("all-goals", [("sarsa", OPEN)], arms=1))
     assert "What rests on one arm speaks of that arm alone: arm 0." in summary(made)
     (tmp_path / "one" / "all-goals").mkdir(parents=True)
     table = rows(ALL_GOALS, wobble, arms=1)
     found = claims(ALL_GOALS, table)
     assert {claim.verdict for claim in found} == {OPEN}
-    page = write_page(
-        ALL_GOALS, tmp_path / "one" / "all-goals", Analysis([], {}, [], found), 4, table.arms
-    ).read_text()
+    page = write_page(ALL_GOALS, tmp_path / "one" / "all-goals", Analysis([], {}, [], found), table).read_text()
     assert "All of it is true of arm 0 alone" in page
     assert "one arm, of which alone this speaks" in page
     assert f"{len(found)} claims: {len(found)} undecided by this design" in page
@@ -100,58 +101,50 @@ def test_the_page_of_one_arm_speaks_of_it_alone(tmp_path: Path) -> None:
         assert claim.criterion.stated() in page
 
 
-def test_all_that_is_judged_at_once_is_told(tmp_path: Path) -> None:
-    results(tmp_path, "all-goals", [("sarsa", "holds"), ("gamma", "does not hold"), ("traces", OPEN)])
-    made = judge(read_all_results(tmp_path))
-    rules = " ".join(sections(made, tmp_path)[0].text)
+def test_all_that_is_judged_at_once_is_told() -> None:
+    made = judge(results("all-goals", [("sarsa", "holds"), ("gamma", "does not hold"), ("traces", OPEN)]))
+    rules = " ".join(sections(made)[0].text)
     assert "3 claims are judged one by one" in rules
     assert "Of the 2 that hold or are refuted 2 also stand" in rules
     assert "1 held up" in summary(made)[0]
 
 
-def test_a_claim_about_nothing_listed_is_not_lost(tmp_path: Path) -> None:
-    results(tmp_path, "all-goals", [("something else", "holds")])
-    found = judged(tmp_path)["all-goals"]
+def test_a_claim_about_nothing_listed_is_not_lost() -> None:
+    found = judged(results("all-goals", [("something else", "holds")]))["all-goals"]
     assert found.conclusion.says == ALL_GOALS.words.question
-    assert [claim.claim for _, claim in found.claims] == ["something else"]
+    assert [claim.text for _, claim in found.claims] == ["something else"]
 
 
-def test_what_is_missing_has_its_command(tmp_path: Path) -> None:
-    results(tmp_path, "all-goals", [("sarsa", "holds")], arms=1, runs=8)
-    results(tmp_path, "long-training", [("q-fluctuates", OPEN)], arms=5, runs=4)
-    made = sections(judge(read_all_results(tmp_path)), tmp_path)
-    commands = {row[0]: row[-1] for row in made[-1].tables[0].rows}
-    assert commands["no-shaping"] == f"pneumarm experiment no-shaping --out {tmp_path}"
-    nine = f"pneumarm experiment long-training --out {tmp_path} --arms $(seq -f virtual:seed=%g -s , 1 9)"
-    assert commands["long-training"] == nine
-    assert set(commands) == OF_THE_THESIS - {"all-goals"}
+def test_what_is_undecided_says_how_many_arms_would() -> None:
+    made = results("all-goals", [("sarsa", "holds")]) | results("long-training", [("q-fluctuates", OPEN)])
+    needed = made["long-training"].claims[0].judgement.arms
+    found = {section.title: section for section in sections(judge(made))}
+    for each in conclusions():
+        said = " ".join(found[each.says].text)
+        assert all(f"pneumarm experiment {name} --out laboratory" in said for name in each.experiments)
+        if each.key == "q-fluctuates":
+            assert f"{needed} arms would decide all that is open" in said
+        elif "Verdict: holds." not in said:
+            assert "5 arms at least" in said or "What would decide it" in said
 
 
-def test_the_command_writes_the_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    results(tmp_path, "all-goals", [("sarsa", "holds")])
+def test_the_command_judges_the_complete_rows_of_a_laboratory(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Whatever the experiment wrote of them; an arm that is not complete does not count."""
+    (tmp_path / "all-goals").mkdir()
+    table = rows(ALL_GOALS, wobble, arms=4)
+    lines = [msgspec.json.encode(row) + b"\n" for row in table.rows]
+    (tmp_path / "all-goals" / ROWS).write_bytes(b"".join(lines[:-1]))
     with pytest.raises(SystemExit) as ended:
         main(["claims", "--out", str(tmp_path), "--json"])
     assert ended.value.code == 0
     found = {each["key"]: each for each in json.loads(capsys.readouterr().out)["conclusions"]}
-    assert found["sarsa"]["verdict"] == "holds"
-    assert found["sarsa"]["claims"][0]["runs"] == 20
-    assert "5 arms, 20 runs" in (tmp_path / "claims.html").read_text()
-
-
-def test_the_table_for_a_note(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """All conclusions, each followed by its claims, thesis beside ours; the terminal shows the same."""
-    results(tmp_path, "all-goals", [("sarsa", "holds"), ("gamma", OPEN), ("sarsa", "does not hold")])
-    with pytest.raises(SystemExit) as ended:
-        main(["claims", "--out", str(tmp_path), "--markdown"])
-    assert ended.value.code == 0
-    lines = capsys.readouterr().out.splitlines()
-    assert {line.count(" | ") for line in lines[2:]} == {4}
-    assert len(lines) == 2 + len(conclusions()) + 3
-    at = next(i for i, line in enumerate(lines) if "SARSA is better" in line)
-    assert lines[at].endswith("| **in part** |")
-    assert lines[at + 1 : at + 3] == [
-        f"| sarsa | 1 | 2 | all-goals: 5 arms, 20 runs | {verdict} |" for verdict in ("holds", "does not hold")
-    ]
+    complete = claims(ALL_GOALS, sorted_rows(table.rows[: 3 * len(table.rows) // 4]))
+    for claim in found["sarsa"]["claims"]:
+        assert (claim["arms"], claim["runs"]) == (3, 12)
+        assert claim["ours"] in {one.ours for one in complete}
+    assert "3 arms, 12 runs" in (tmp_path / "claims.html").read_text()
     with pytest.raises(SystemExit):
         main(["claims", "--out", str(tmp_path)])
     shown = " ".join(capsys.readouterr().out.split())
@@ -159,15 +152,15 @@ def test_the_table_for_a_note(tmp_path: Path, capsys: pytest.CaptureFixture[str]
         assert each.says in shown
 
 
-def test_a_damaged_result_is_said(tmp_path: Path) -> None:
+def test_a_laboratory_without_rows_is_said(tmp_path: Path) -> None:
     with pytest.raises(UnusableInput, match="expected the folder of a laboratory"):
-        read_all_results(tmp_path / "nothing")
+        rows_by_kind(tmp_path / "nothing")
+    with pytest.raises(UnusableInput, match="expected rows of experiments; finish one first"):
+        rows_by_kind(tmp_path)
     (tmp_path / "all-goals").mkdir()
-    with pytest.raises(UnusableInput, match="expected experiments with results; finish one first"):
-        read_all_results(tmp_path)
-    (tmp_path / "all-goals" / "results.json").write_text('{"experiment": "all-goals"}')
-    with pytest.raises(UnusableInput, match=r"results.json: expected results of an experiment .*run it again"):
-        read_all_results(tmp_path)
+    (tmp_path / "all-goals" / ROWS).write_text("{}\n")
+    with pytest.raises(UnusableInput, match=r"rows.jsonl, line 1: expected a row of an experiment"):
+        rows_by_kind(tmp_path)
 
 
 def rows(made: Factorial, reward: Any, arms: int = 3, runs: int = 4, success: float = 1.0) -> TrialRows:
@@ -291,7 +284,7 @@ def test_results_carry_what_claims_need(tmp_path: Path) -> None:
     table = rows(ALL_GOALS, wobble)
     (tmp_path / "all-goals").mkdir()
     analysis = Analysis([], {"rows": 3}, [], claims(ALL_GOALS, table))
-    write_page(ALL_GOALS, tmp_path / "all-goals", analysis, table.runs, table.arms)
-    found = read_all_results(tmp_path)["all-goals"]
-    assert (len(found.arms), found.runs) == (3, 4)
-    assert {claim.about for claim in found.claims} == keys_of("all-goals")
+    write_page(ALL_GOALS, tmp_path / "all-goals", analysis, table)
+    found = json.loads((tmp_path / "all-goals" / "results.json").read_text())
+    assert (len(found["arms"]), found["runs"], found["rows"]) == (3, 4, 3)
+    assert {claim["about"] for claim in found["claims"]} == keys_of("all-goals")

@@ -89,7 +89,7 @@ def test_an_experiment_leaves_a_page(name: str, small_material: Simulated, tmp_p
     first = rows.rows[0]
     assert experiment.measure(small_material, first.trial, first.run, LABORATORY) == first.figures
     analysis = experiment.analyse(rows)
-    page = write_page(experiment, tmp_path, analysis, rows.runs, rows.arms).read_text()
+    page = write_page(experiment, tmp_path, analysis, rows).read_text()
     assert page.count("data:image/svg") == sum(len(section.figures) for section in analysis.sections) > 0
     results = json.loads((tmp_path / "results.json").read_text())
     assert len(results["claims"]) == len(analysis.claims)
@@ -240,7 +240,7 @@ def test_they_move_any_arm(name: str, plain_laboratory: Path, tmp_path: Path) ->
     analysis = experiment.analyse(done.rows)
     told = "Only a virtual arm can" in " ".join(analysis.summary)
     assert told == (name == "transfer")
-    assert write_page(experiment, tmp_path, analysis, 1, (PLAIN,)).exists()
+    assert write_page(experiment, tmp_path, analysis, done.rows).exists()
 
 
 def test_it_is_said_for_how_long_an_arm_will_be_needed(tmp_path: Path) -> None:

@@ -76,7 +76,7 @@ def test_an_experiment_from_the_arm_to_its_page(chosen: SeveralJoints, laborator
     assert done.computed == len(chosen.trials)
     assert sweep(chosen, laboratory, [ARM], 1, SMALL).computed == 0
     analysis = chosen.analyse(done.rows)
-    page = write_page(chosen, laboratory / chosen.name, analysis, 1, (ARM,)).read_text()
+    page = write_page(chosen, laboratory / chosen.name, analysis, done.rows).read_text()
     assert {claim.about for claim in analysis.claims} == keys_of(chosen.name)
     assert "How the arm moved" in page
     assert "nan" not in re.sub(r'"data:[^"]*"', "", page)
@@ -226,3 +226,8 @@ def test_flat_and_hierarchical_agents_have_the_same_budget() -> None:
 def test_an_arm_of_one_joint_is_refused(asked: SeveralJoints, tmp_path: Path) -> None:
     with pytest.raises(UnusableInput, match=r"'virtual:seed=1.*one joint"):
         asked.prepare("virtual:seed=1", tmp_path, SMALL, _silent)
+
+
+def test_one_joint_and_two_are_fitted_alike() -> None:
+    fit = joint_data("joint-data", 12_000, 24_000).recipe.fit
+    assert {fit.with_layers(joints, 24_000).layers for joints in (1, 2)} == {1}

@@ -144,7 +144,7 @@ def test_a_killed_sweep_goes_on(tmp_path: Path) -> None:
 
 def test_a_page_is_drawn_from_rows_alone(tmp_path: Path) -> None:
     done = sweep(Toy(), tmp_path)
-    page = write_page(Toy(), tmp_path / "toy", Toy().analyse(done.rows), done.rows.runs, done.rows.arms)
+    page = write_page(Toy(), tmp_path / "toy", Toy().analyse(done.rows), done.rows)
     assert "It does." in page.read_text()
     assert "How the arm moved" not in page.read_text()  # no recording of it is left
     assert '"shape"' in (tmp_path / "toy" / "results.json").read_text()
@@ -152,7 +152,8 @@ def test_a_page_is_drawn_from_rows_alone(tmp_path: Path) -> None:
 
 def test_a_page_plays_the_arm_itself(tmp_path: Path) -> None:
     """Not an arm that was made from it, such as one of its joints, whose recording lies beside its own."""
-    arm, done = "virtual:joints=2,seed=1", sweep(Toy(), tmp_path)
+    arm = "virtual:joints=2,seed=1"
+    done = sweep(Toy(), tmp_path, [arm])
     for place, name in (("0", arm), ("1", "virtual:seed=1"), ("2", arm)):
         folder = arm_folder(tmp_path, arm) / place
         folder.mkdir(parents=True)
@@ -163,7 +164,7 @@ def test_a_page_plays_the_arm_itself(tmp_path: Path) -> None:
         else:  # what is damaged is left out
             (folder / STORE).write_bytes(b"")
             (folder / SETTINGS).write_text("{")
-    page = write_page(Toy(), tmp_path / "toy", Toy().analyse(done.rows), 1, (arm,)).read_text()
+    page = write_page(Toy(), tmp_path / "toy", Toy().analyse(done.rows), done.rows).read_text()
     assert "How the arm moved" in page
     pictures = [b64decode(data).decode() for data in re.findall(r"data:image/svg\+xml;base64,([^\"]+)", page)]
     assert "joint 2" in pictures[0]

@@ -62,7 +62,7 @@ def test_an_experiment_from_the_arm_to_its_page(chosen: Experiment, laboratory: 
     assert done.computed == 2 * len(chosen.trials)
     assert sweep(chosen, laboratory, [ARM], 2, SMALL).computed == 0
     analysis = chosen.analyse(done.rows)
-    page = write_page(chosen, laboratory / chosen.name, analysis, 2, (ARM,)).read_text()
+    page = write_page(chosen, laboratory / chosen.name, analysis, done.rows).read_text()
     assert {claim.about for claim in analysis.claims} == keys_of(chosen.name)
     for claim in analysis.claims:
         assert claim.verdict == OPEN  # of one arm

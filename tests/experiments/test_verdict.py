@@ -77,7 +77,10 @@ def test_one_arm_decides_nothing_however_sure_its_runs_are() -> None:
     assert (said.verdict, said.arms) == (OPEN, FEWEST_ARMS)
     assert said.why.startswith("one arm, of which alone this speaks (there it is as claimed)")
     assert "not as claimed" in LESS.judge({"found": runs}).why
-    assert MORE.judge({"found": Interval(math.nan, math.inf, 0)}).why == "no rows have this figure"
+    assert (
+        MORE.judge({"found": Interval(math.nan, math.inf, 0)}).why
+        == "no rows have this figure; 5 arms at least that have it are needed"
+    )
 
 
 def test_what_is_undecided_says_how_many_arms_would_decide_it() -> None:

@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import builders
+import msgspec
 import numpy as np
 import pytest
 from PIL import Image
@@ -27,7 +28,7 @@ from pneumarm.experiments.all_goals import EXPERIMENT as ALL_GOALS
 from pneumarm.experiments.experiment import Row, sorted_rows
 from pneumarm.experiments.preparation import STORE, claim
 from pneumarm.experiments.results import write_page
-from pneumarm.experiments.sweep import arm_folder
+from pneumarm.experiments.sweep import ROWS, arm_folder
 from pneumarm.report.checkup import checkup_page
 from pneumarm.report.files import ANALYSIS
 from pneumarm.report.run_report import run_page, write_analysis
@@ -97,7 +98,9 @@ def make_laboratory(folder: Path) -> None:
     claim(recording, {"arm": table.arms[0]})
     with open_arm(table.arms[0]) as arm, Store.for_arm(recording / STORE, arm.spec) as store:
         collect(arm, store, 2000)
-    write_page(ALL_GOALS, folder / ALL_GOALS.name, ALL_GOALS.analyse(table), table.runs, table.arms)
+    write_page(ALL_GOALS, folder / ALL_GOALS.name, ALL_GOALS.analyse(table), table)
+    lines = [msgspec.json.encode(row) + b"\n" for row in table.rows]
+    (folder / ALL_GOALS.name / ROWS).write_bytes(b"".join(lines))
     with pytest.raises(SystemExit):
         main(["claims", "--out", str(folder)])
 

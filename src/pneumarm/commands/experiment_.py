@@ -55,7 +55,7 @@ def experiment_(
     names = chosen.arms if arms is None else names_in(arms)
     done = sweep(chosen, out, names, runs, settings, workers=workers, dask=dask, progress=progress, tell=say)
     analysis = chosen.analyse(done.rows)
-    page = write_page(chosen, out / chosen.name, analysis, done.rows.runs, done.rows.arms)
+    page = write_page(chosen, out / chosen.name, analysis, done.rows)
     found = {
         "experiment": chosen.name,
         "rows": len(done.rows.rows),

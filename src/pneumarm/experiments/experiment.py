@@ -142,6 +142,17 @@ class Claim:
         return self.judgement.verdict
 
     @property
+    def short(self) -> str:
+        """Its verdict, and how many arms would decide it."""
+        arms = self.judgement.arms
+        return f"{self.verdict} ({arms:,} arms would)" if arms else self.verdict
+
+    @property
+    def explained(self) -> str:
+        """Its verdict with its reason."""
+        return f"{self.verdict}: {self.judgement.why}" if self.judgement.why else self.verdict
+
+    @property
     def medians(self) -> str:
         """What the medians of the runs say in place of their means, for people."""
         found = [self.found[name] for name in self.criterion.names]

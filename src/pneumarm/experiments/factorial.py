@@ -111,7 +111,9 @@ class Factorial(Trainings):
         # The same seed: the first episodes of this training are those of the one above.
         longer = replace(wanted, stops=False, max_episodes=self.continued)
         later = train_and_test(material, longer, run, settings, self.goal)
-        return {**later, "gain": later["reward"] - found["reward"], "episodes": found["episodes"]}
+        tests = [test for test in ("", EXPLORING) if f"{test}reward" in found]
+        gains = {f"{test}gain": later[f"{test}reward"] - found[f"{test}reward"] for test in tests}
+        return {**later, **gains, "episodes": found["episodes"]}
 
     def analyse(self, rows: TrialRows) -> Analysis:
         """Return rankings, effects and tests of every criterion, beside the thesis'."""

@@ -3,6 +3,7 @@
 import math
 import textwrap
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -54,7 +55,7 @@ def courses(
     for label, curves in quantities.items():
         ends = [f"{c.name} from {c.intervals[0]:.2f} to {c.intervals[-1]:.2f}" for c in curves]
         said.append(f"{_line(label)}: {', '.join(ends)}")
-    return Picture(_courses(quantities, block, marks or {}), caption, ". ".join(said) + ".")
+    return Picture(partial(_courses, quantities, block, marks or {}), caption, ". ".join(said) + ".")
 
 
 @styled
@@ -108,7 +109,7 @@ def dots(
         f"{_line(label)}: " + ", ".join(f"{name} {one:.2f}" for name, one in zip(names, found, strict=True))
         for label, found in quantities.items()
     ]
-    return Picture(_dots(names, quantities, zero, reference), caption, ". ".join(said) + ".")
+    return Picture(partial(_dots, names, quantities, zero, reference), caption, ". ".join(said) + ".")
 
 
 @styled
@@ -149,7 +150,7 @@ def against(
         f"{column.words}: " + ", ".join(f"{text(rows, column, trial)} ({words})" for trial, words in trials.items())
         for column in columns
     ]
-    return Picture(_against(rows, trials, axis, columns), caption, ". ".join(said) + ".")
+    return Picture(partial(_against, rows, trials, axis, columns), caption, ". ".join(said) + ".")
 
 
 @styled

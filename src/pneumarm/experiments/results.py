@@ -3,10 +3,11 @@
 import re
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any, NamedTuple
 
 from pneumarm.console import jsonable
 from pneumarm.errors import UnusableInput
-from pneumarm.experiments.experiment import Analysis, Experiment
+from pneumarm.experiments.experiment import Analysis, Claim, Experiment, TrialRows
 from pneumarm.experiments.preparation import SETTINGS, STORE
 from pneumarm.experiments.sweep import arm_folder
 from pneumarm.experiments.verdict import counted
@@ -28,21 +29,38 @@ _SHOWN = 12.0
 """Seconds of an arm's recording that the page plays."""
 
 
-def write_page(experiment: Experiment, folder: Path, analysis: Analysis, runs: int, arms: tuple[str, ...]) -> Path:
+class Results(NamedTuple):
+    """What the rows of an experiment say of the thesis."""
+
+    experiment: str
+    arms: tuple[str, ...]
+    runs: int
+    """On each arm."""
+    claims: tuple[Claim, ...]
+
+    @property
+    def sample(self) -> str:
+        """Arms and runs in words."""
+        return f"{_many(len(self.arms), 'arm')}, {_many(len(self.arms) * self.runs, 'run')}"
+
+
+def claim_row(claim: Claim) -> list[str]:
+    """Return a ``claim`` as a line of a table: itself, stated beforehand, thesis, ours, by the medians, verdict."""
+    cells = claim.text, claim.criterion.stated(), claim.thesis, claim.ours, claim.medians, claim.explained
+    return [_HYPHEN.sub("−", cell) for cell in cells]
+
+
+def claim_figures(claim: Claim) -> dict[str, Any]:
+    """Return a ``claim`` for programs."""
+    names = ("claim", "stated", "thesis", "ours", "medians")
+    return {**dict(zip(names, claim_row(claim), strict=False)), "about": claim.about, **claim.judgement._asdict()}
+
+
+def write_page(experiment: Experiment, folder: Path, analysis: Analysis, rows: TrialRows) -> Path:
     """Write ``page.html`` and ``results.json`` to ``folder``, one of a laboratory; return the path of the page."""
-    claims = [
-        {
-            "claim": c.text,
-            "thesis": c.thesis,
-            "ours": c.ours,
-            "about": c.about,
-            "stated": c.criterion.stated(),
-            "medians": c.medians,
-            **c.judgement._asdict(),
-        }
-        for c in analysis.claims
-    ]
+    arms, runs = rows.arms, rows.runs
     of = {"experiment": experiment.name, "arms": list(arms), "runs": runs}
+    claims = [claim_figures(claim) for claim in analysis.claims]
     write_json(folder / RESULTS, jsonable({**analysis.figures, **of, "claims": claims}))
     of_trials = f"{_many(runs, 'run')} of {_many(len(experiment.trials), 'trial')}"
     where = f"{experiment.words.source}. {of_trials} on {_listed(arms)}."
@@ -50,13 +68,9 @@ def write_page(experiment: Experiment, folder: Path, analysis: Analysis, runs: i
     summary = [*analysis.summary, where]
     if analysis.claims:
         summary.insert(0, f"{counted([c.verdict for c in analysis.claims], 'claim').capitalize()}.")
-        lines = [
-            (c.text, c.criterion.stated(), c.thesis, c.ours, c.medians, verdict_in_words(c.verdict, c.judgement.why))
-            for c in analysis.claims
-        ]
-        rows = [[_HYPHEN.sub("−", cell) for cell in line] for line in lines]
+        lines = [claim_row(claim) for claim in analysis.claims]
         header = ["claim", "stated beforehand", "thesis", "here", "by the medians", "verdict"]
-        table = Table(header, rows, "What the thesis found, and what holds here.", words=True)
+        table = Table(header, lines, "What the thesis found, and what holds here.", words=True)
         sections.insert(0, Section("Claims", [RULES], tables=[table]))
     if len(arms) == 1:
         summary.insert(0, f"All of it is true of {arms[0]} alone, and of this recording of it: no verdict is firmer.")
@@ -97,8 +111,3 @@ def _listed(arms: Sequence[str]) -> str:
 
 def _many(count: int, what: str) -> str:
     return f"{count} {what}{'s' * (count != 1)}"
-
-
-def verdict_in_words(verdict: str, why: str) -> str:
-    """Return a verdict with its reason."""
-    return f"{verdict}: {why}" if why else verdict

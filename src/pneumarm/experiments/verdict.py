@@ -163,11 +163,18 @@ class Criterion(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
         said = f"holds {' and '.join(holds)}, refuted {' or '.join(refuted)}; {self.matters:g} matters"
         return said.replace("-", "\N{MINUS SIGN}")
 
+    def parts(self, found: Mapping[str, Any]) -> dict[str, Interval]:
+        """Return what it is judged by, of what was ``found``; a figure may be several intervals by name."""
+        parts: dict[str, Interval] = {}
+        for name in self.names:
+            parts |= found[name] if isinstance(found[name], Mapping) else {name: found[name]}
+        return parts
+
     def judge(self, found: Mapping[str, Any]) -> Judgement:
-        """Return the verdict that what was ``found`` allows; a figure may be several intervals by name."""
-        parts = dict(_parts(self.names, found))
+        """Return the verdict that what was ``found`` allows."""
+        parts = self.parts(found)
         if not all(one.samples for one in parts.values()):
-            return Judgement(OPEN, "no rows have this figure")
+            return Judgement(OPEN, f"no rows have this figure; {FEWEST_ARMS} arms at least that have it are needed")
         if any(one.arms < 2 or not math.isfinite(one.half) for one in parts.values()):
             return Judgement(OPEN, self._of_one_arm(parts), FEWEST_ARMS)
         means = {name: self._region(one) for name, one in parts.items()}
@@ -212,7 +219,10 @@ class Criterion(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
 
     def _reasons(self, of_mean: Verdict, one: Interval) -> Iterator[str]:
         if of_mean == OPEN and one.flat:
-            yield "most rows end at the same floor or ceiling, which would hide an effect"
+            yield (
+                "most rows end at the same floor or ceiling, which hides an effect on however many arms; what would "
+                f"decide it is a figure without such an end, on {FEWEST_ARMS} arms at least"
+            )
         if of_mean == "in part":
             yield f"it does, but by less than matters ({self.matters:g})"
         if one.median is not None and (of_median := self._region(one.median)) != of_mean:
@@ -237,12 +247,6 @@ class Criterion(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
 
 
 _VERB = {"holds": "holds", "in part": "holds in part", "does not hold": "does not", OPEN: "cannot be decided"}
-
-
-def _parts(names: Sequence[str], found: Mapping[str, Any]) -> Iterator[tuple[str, Interval]]:
-    for name in names:
-        one = found[name]
-        yield from one.items() if isinstance(one, Mapping) else [(name, one)]
 
 
 def together(verdicts: Iterable[Verdict]) -> Verdict:

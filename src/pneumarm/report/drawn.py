@@ -22,7 +22,7 @@ def as_text(section: Section) -> Section:
     return replace(
         section,
         figures=tuple(
-            one if isinstance(one.figure, str) else replace(one, figure=svg(one.figure)) for one in section.figures
+            one if isinstance(one.figure, str) else replace(one, drawn=svg(one.figure)) for one in section.figures
         ),
     )
 

@@ -2,8 +2,9 @@
 
 import base64
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -17,8 +18,8 @@ from pneumarm.report.style import Described, svg
 class Picture:
     """A figure, what it shows in general (caption) and what is to be seen in it (text alternative)."""
 
-    figure: Figure | str
-    """Drawn, or an SVG as text."""
+    drawn: Figure | str | Callable[[], Figure]
+    """Drawn, or an SVG as text, or what draws it when it is asked for."""
     caption: str
     alt: str = ""
     """That of a figure that carries its own where none is given."""
@@ -27,9 +28,14 @@ class Picture:
 
     def __post_init__(self) -> None:
         if not self.alt:
-            if not isinstance(self.figure, Described) or not self.figure.alt:
+            if not isinstance(self.drawn, Described) or not self.drawn.alt:
                 raise ValueError(f"a picture needs a text alternative: {self.caption}")
-            object.__setattr__(self, "alt", self.figure.alt)
+            object.__setattr__(self, "alt", self.drawn.alt)
+
+    @cached_property
+    def figure(self) -> Figure | str:
+        """The figure, or its SVG as text."""
+        return self.drawn() if callable(self.drawn) else self.drawn
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ import itertools
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -69,8 +70,13 @@ class Design:
 
     def interactions(self, column: int) -> tuple[tuple[Factor, Factor], ...]:
         """Return the pairs of factors whose interaction falls on ``column``."""
+        return tuple(pair for pair, columns in self._pairs if column in columns)
+
+    @cached_property
+    def _pairs(self) -> list[tuple[tuple[Factor, Factor], tuple[int, ...]]]:
+        """Pairs of factors with the columns that their interaction falls on."""
         pairs = itertools.combinations(self.factors, 2)
-        return tuple((a, b) for a, b in pairs if column in self.array.interaction(a.column, b.column))
+        return [((a, b), self.array.interaction(a.column, b.column)) for a, b in pairs]
 
     def label(self, column: int) -> str:
         """Return the label of ``column`` as in table 5.3: its factor, else the interactions on it, else nothing."""

@@ -1,6 +1,7 @@
 """An analysis as sections of a page."""
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from types import MappingProxyType
 
 import numpy as np
@@ -89,14 +90,14 @@ def _pictures(analysis: TableAnalysis, quantity: str, cited: Mapping[str, str]) 
         lines = {f"run {number}": found for number, found in enumerate(analysis.runs, 1)}
         drawn.append(
             Picture(
-                effects_figure(analysis, lines, quantity),
+                partial(effects_figure, analysis, lines, quantity),
                 _caption(f"Effects on the {quantity} for all runs apart, a line a run", "runs", cited),
                 f"{len(lines)} lines in {analysis.design.array.columns} columns.",
             )
         )
         drawn.append(
             Picture(
-                half_normal_runs_figure(analysis, quantity),
+                partial(half_normal_runs_figure, analysis, quantity),
                 _caption("Half-normal probability plots for all runs apart, a line a run", "half-normal runs", cited),
                 f"Largest effects by run: {', '.join(f'{found.sizes.max():.2f}' for found in analysis.runs)}.",
             )
@@ -106,14 +107,14 @@ def _pictures(analysis: TableAnalysis, quantity: str, cited: Mapping[str, str]) 
         largest = _column(analysis, analysis.effects[name].ranking[0])
         drawn.append(
             Picture(
-                effects_figure(analysis, {name: analysis.effects[name]}, f"{name} of {quantity}"),
+                partial(effects_figure, analysis, {name: analysis.effects[name]}, f"{name} of {quantity}"),
                 _caption(f"Effects on the {name} of the {quantity}", name, cited),
                 f"The largest effect is that of column {largest}.",
             )
         )
     drawn.append(
         Picture(
-            half_normal_figure(analysis, names, quantity),
+            partial(half_normal_figure, analysis, names, quantity),
             _caption("Half-normal probability plots of the effects, with Lenth's margins", "half-normal", cited),
             "; ".join(f"{name}: beyond the margin {_listed(analysis, name)}" for name in names),
         )

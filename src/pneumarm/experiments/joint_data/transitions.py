@@ -7,8 +7,16 @@ from typing import Any
 
 from pneumarm.arm.open import with_options
 from pneumarm.experiments.experiment import Axis, Figures, LaboratorySettings
-from pneumarm.experiments.several_joints import POLICY, Lesson, SeveralJoints, lesson_results, of_several
-from pneumarm.experiments.there_and_back import Prepared, prepared
+from pneumarm.experiments.several_joints import (
+    FIT,
+    POLICY,
+    TRANSITIONS,
+    Lesson,
+    SeveralJoints,
+    lesson_results,
+    of_several,
+)
+from pneumarm.experiments.there_and_back import Prepared, Recipe, prepared
 from pneumarm.experiments.words import words_of
 from pneumarm.progress import Report
 
@@ -55,6 +63,10 @@ class JointData(SeveralJoints):
 
 
 def joint_data(name: str, *sizes: int) -> JointData:
-    """Return the experiment called ``name`` with these numbers of transitions, in ascending order."""
+    """Return the experiment called ``name`` with these numbers of transitions, in ascending order.
+
+    Networks of two joints have one layer too and are fitted by Levenberg-Marquardt, so that only the joints differ.
+    """
     lessons = {f"{size:,}": Lesson(POLICY) for size in sizes}
-    return JointData(name=name, words=words_of(__package__), lessons=lessons, sizes=sizes)
+    recipe = Recipe(TRANSITIONS, fit=replace(FIT, layers=1))
+    return JointData(name=name, words=words_of(__package__), lessons=lessons, sizes=sizes, recipe=recipe)

@@ -30,7 +30,7 @@ from pneumarm.networks import (
     two_layers,
 )
 from pneumarm.networks import importance as importance_of
-from pneumarm.settings import NonNegativeFloat, NonNegativeInt, PositiveInt, Settings, Valid
+from pneumarm.settings import NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveInt, Settings, Valid
 from pneumarm.simulation.ahead import fitted_ahead, stretches
 from pneumarm.simulation.history import LONGEST, SEEN, USUAL, chosen_history, columns
 from pneumarm.simulation.quality import Statistics, statistics
@@ -86,6 +86,8 @@ class FitSettings(Settings):
     memory: PositiveInt | None = None
     """Observations in the state, for a policy to see; by default 8 or more where predictions are fitted ahead, for
     agents that settle, and else no more than the networks read (thesis)."""
+    hysteresis: tuple[PositiveFloat, ...] = ()
+    """Radii of stop operators by which the networks remember how a joint came to where it is [degrees]."""
     approximator: Literal["network", "least-squares"] = "network"
     """Function approximator: a network (thesis), or a linear model by least squares."""
     layers: Literal[1, 2] | None = None
@@ -436,7 +438,8 @@ def _unfitted(
 
 
 def _window(spec: ArmSpec, settings: FitSettings) -> Window:
-    return Window.of(spec, settings.observations, settings.sensors)
+    radii = tuple(one * spec.counts_per_degree for one in settings.hysteresis)
+    return Window.of(spec, settings.observations, settings.sensors, radii)
 
 
 def _commands(training: Transitions, window: Window) -> Commands:

@@ -50,6 +50,8 @@ class SimulationParameters(NamedTuple):
     """Highest prediction, shape (outputs,) [scaled]."""
     velocity: NDArray[np.float32]
     """Derived velocity by change of the angle, and at rest, shape (joints, 2) [scaled]; (0, 2) if predicted."""
+    stops: NDArray[np.float32]
+    """Change of each stop operator by that of its angle, both scaled, shape (joints, remembered)."""
     layout: Layout
 
 
@@ -115,6 +117,7 @@ def simulation_parameters(simulation: Simulation) -> SimulationParameters:
         lowest=_float32(lowest[simulation.outputs]),
         highest=_float32(highest[simulation.outputs]),
         velocity=_float32(velocity if simulation.velocity == "derived" else velocity[:0]),
+        stops=_float32(scale[:, :1] / np.array(window.hysteresis, np.float64)),
         layout=layout,
     )
 
@@ -197,7 +200,7 @@ def shift(layout, x, command):  # type: ignore[no-untyped-def]
     for i in range(newest - 1, layout.observed - 1, -1):
         x[i] = x[i - layout.observed]
     if layout.history > 1:
-        for i in range(layout.command - 1, newest + layout.commanded - 1, -1):
+        for i in range(layout.memory - 1, newest + layout.commanded - 1, -1):
             x[i] = x[i - layout.commanded]
         for i in range(layout.commanded):
             x[newest + i] = command[i]
@@ -208,6 +211,9 @@ def push(simulation, x, change, command):  # type: ignore[no-untyped-def]
     """Shift the window in ``x`` by one step: add ``change`` to the newest observation, remember ``command``."""
     layout = simulation.layout
     shift(layout, x, command)
+    for i in range(simulation.stops.size):
+        joint = i // layout.remembered
+        x[layout.memory + i] -= simulation.stops[joint, i % layout.remembered] * x[angle_at(layout, 0, joint)]
     for joint in range(simulation.velocity.shape[0]):
         x[velocity_at(layout, 0, joint)] = x[angle_at(layout, 0, joint)]
     for o in range(change.shape[0]):
@@ -217,6 +223,10 @@ def push(simulation, x, change, command):  # type: ignore[no-untyped-def]
         velocity = velocity_at(layout, 0, joint)
         moved = x[angle_at(layout, 0, joint)] - x[velocity]
         x[velocity] = moved * simulation.velocity[joint, 0] + simulation.velocity[joint, 1]
+    for i in range(simulation.stops.size):
+        joint, place = i // layout.remembered, layout.memory + i
+        followed = x[place] + simulation.stops[joint, i % layout.remembered] * x[angle_at(layout, 0, joint)]
+        x[place] = min(max(followed, np.float32(-1.0)), np.float32(1.0))
 
 
 @part

@@ -27,6 +27,8 @@ class StateTracker:
         self._layout = layout_of(window)
         self._measures = window.velocity == "measured"
         self._command_scale = scaling.command_scale
+        self._memory = np.zeros((window.joints, len(window.hysteresis)))
+        self._angle: NDArray[np.float64] | None = None
         self.reset()
 
     def reset(self) -> None:
@@ -34,7 +36,7 @@ class StateTracker:
         self.velocity: NDArray[np.float64] = np.zeros(self.window.joints)
         """Angular velocities at the newest reading, shape (joints,) [counts/ms]."""
         self._time = 0.0
-        self._angle: NDArray[np.float64] | None = None
+        self._first = True
         self._state = np.zeros(self.window.state_size, np.float32)
         self._command = np.zeros(self.window.command_size)
 
@@ -49,12 +51,12 @@ class StateTracker:
         window, state = self.window, self._state
         angle = np.array(angle, np.float64).reshape(window.joints)
         observed = window.observation_size
-        first = self._angle is None
+        first, before = self._first, self._angle
         if self._measures:
             self.velocity = np.array(measured[: window.joints], np.float64)
-        elif self._angle is not None and time > self._time:
-            self.velocity = derived_velocity(angle, self._angle, time - self._time)
-        self._time, self._angle = time, angle
+        elif before is not None and not first and time > self._time:
+            self.velocity = derived_velocity(angle, before, time - self._time)
+        self._time, self._angle, self._first = time, angle, False
         observation = np.empty(observed)
         joints = window.of_joints(observation)
         joints[:, 0], joints[:, 1] = angle, self.velocity
@@ -67,6 +69,10 @@ class StateTracker:
         else:
             shift(self._layout, state, self._command)  # ten times as fast as in plain Python
             state[:observed] = newest
+        if before is not None and window.hysteresis:
+            followed = self._memory + (angle - before)[:, None] / np.array(window.hysteresis)
+            self._memory = np.clip(followed, -1, 1)
+        state[self._layout.memory :] = self._memory.ravel()
         return state.copy()
 
     def reading(self, reading: Reading) -> NDArray[np.float32]:

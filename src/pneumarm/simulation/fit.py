@@ -41,6 +41,7 @@ from pneumarm.transitions.collect import FEWEST_TRANSITIONS
 from pneumarm.transitions.filtering import Filtered, filter_transitions
 from pneumarm.transitions.goals import held_range, seen_goals
 from pneumarm.transitions.grid import GridSettings
+from pneumarm.transitions.hysteresis import RADII
 from pneumarm.transitions.rows import Rows
 from pneumarm.transitions.store import Store
 from pneumarm.transitions.window import QUANTITIES, Transitions, Window
@@ -86,8 +87,9 @@ class FitSettings(Settings):
     memory: PositiveInt | None = None
     """Observations in the state, for a policy to see; by default 8 or more where predictions are fitted ahead, for
     agents that settle, and else no more than the networks read (thesis)."""
-    hysteresis: tuple[PositiveFloat, ...] = ()
-    """Radii of stop operators by which the networks remember how a joint came to where it is [degrees]."""
+    hysteresis: tuple[PositiveFloat, ...] | None = None
+    """Radii of stop operators, by which the state remembers how a joint came to where it is [degrees]; by default 1
+    and 5 where predictions are fitted ahead, for agents that settle, and else none (thesis)."""
     approximator: Literal["network", "least-squares"] = "network"
     """Function approximator: a network (thesis), or a linear model by least squares."""
     layers: Literal[1, 2] | None = None
@@ -137,7 +139,12 @@ class FitSettings(Settings):
         """Return the settings with the history and memory that suit the arm of ``store`` where none is asked for."""
         history = self.history or min(chosen_history(store, store.spec, self.sensors), self._longest(store))
         settles = self.ahead > 0 and self.approximator == "network"
-        return replace(self, history=history, memory=self.memory or max(history, SEEN if settles else 1))
+        return replace(
+            self,
+            history=history,
+            memory=self.memory or max(history, SEEN if settles else 1),
+            hysteresis=(RADII if settles else ()) if self.hysteresis is None else self.hysteresis,
+        )
 
     def with_layers(self, joints: int, rows: int) -> "FitSettings":
         """Return the settings with what suits ``joints`` and ``rows`` where no layers or hidden units are chosen."""
@@ -438,7 +445,7 @@ def _unfitted(
 
 
 def _window(spec: ArmSpec, settings: FitSettings) -> Window:
-    radii = tuple(one * spec.counts_per_degree for one in settings.hysteresis)
+    radii = tuple(one * spec.counts_per_degree for one in settings.hysteresis or ())
     return Window.of(spec, settings.observations, settings.sensors, radii)
 
 

@@ -80,7 +80,9 @@ def _resting(rows: Rows, window: Window, spec: ArmSpec) -> NDArray[np.float64]:
     return np.concatenate(parts)
 
 
-def _window(newest_first: list[NDArray[np.float64]], memory: NDArray[np.float64], window: Window) -> NDArray[np.float64]:
+def _window(
+    newest_first: list[NDArray[np.float64]], memory: NDArray[np.float64], window: Window
+) -> NDArray[np.float64]:
     closed = np.zeros((len(memory), (window.history - 1) * window.command_size))
     return np.concatenate([*newest_first, closed, memory], axis=1)
 

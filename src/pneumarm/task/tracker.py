@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pneumarm.arm.seam import Reading, measured
 from pneumarm.arm.velocity import derived_velocity
-from pneumarm.simulation.kernel import shift
+from pneumarm.simulation.kernel import remember, shift, stops_by_angle
 from pneumarm.simulation.layout import layout_of
 from pneumarm.simulation.simulation import Scaling
 from pneumarm.transitions.window import QUANTITIES, Window
@@ -27,17 +27,18 @@ class StateTracker:
         self._layout = layout_of(window)
         self._measures = window.velocity == "measured"
         self._command_scale = scaling.command_scale
-        self._memory = np.zeros((window.joints, len(window.hysteresis)))
+        self._by_angle = stops_by_angle(window, scaling)
+        self._state = np.zeros(window.state_size, np.float32)
         self._angle: NDArray[np.float64] | None = None
         self.reset()
 
     def reset(self) -> None:
-        """Begin an episode: the next reading is one at rest."""
+        """Begin an episode: the next reading is one at rest. How a joint came to where it is stays known."""
         self.velocity: NDArray[np.float64] = np.zeros(self.window.joints)
         """Angular velocities at the newest reading, shape (joints,) [counts/ms]."""
         self._time = 0.0
         self._first = True
-        self._state = np.zeros(self.window.state_size, np.float32)
+        self._state[: self._layout.memory] = 0.0
         self._command = np.zeros(self.window.command_size)
 
     def push(
@@ -70,9 +71,9 @@ class StateTracker:
             shift(self._layout, state, self._command)  # ten times as fast as in plain Python
             state[:observed] = newest
         if before is not None and window.hysteresis:
-            followed = self._memory + (angle - before)[:, None] / np.array(window.hysteresis)
-            self._memory = np.clip(followed, -1, 1)
-        state[self._layout.memory :] = self._memory.ravel()
+            moved = (angle - before) / window.of_joints(self._scale)[:, 0]
+            for joint in range(window.joints):
+                remember(self._layout, self._by_angle[joint], state, joint, np.float32(moved[joint]), np.float32(1.0))
         return state.copy()
 
     def reading(self, reading: Reading) -> NDArray[np.float32]:

@@ -17,6 +17,9 @@ from numpy.typing import NDArray
 
 from pneumarm.kernels import kernel
 
+RADII = (1.0, 5.0)
+"""Radii [degrees] by default (docs/decisions/simulation.md)."""
+
 
 @kernel
 def _follow(angle, first, radii, stops):  # type: ignore[no-untyped-def]

@@ -110,7 +110,7 @@ def test_the_gradient_is_that_of_the_cost(store: Path, single: Simulation, layer
 def test_later_steps_are_predicted_better(store: Path, single: Simulation, layers: Literal[1, 2]) -> None:
     """And single ones about as well, on sequences that were not fitted."""
     with Store.open(store) as opened:
-        chosen = FitSettings(epochs=10, memory=1, layers=layers)
+        chosen = FitSettings(epochs=10, memory=1, hysteresis=(), layers=layers)
         single = single if layers == 1 else fit_store(opened, replace(chosen, ahead=0.0, spread=False)).simulation
         fitted = fit_store(opened, chosen).simulation
         blocks = [rows.where(held_out(rows.sequence, single.held_out, single.seed)) for rows in opened.blocks()]

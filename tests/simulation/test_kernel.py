@@ -168,7 +168,8 @@ def test_readings_stay_within_the_sensors(sign: int) -> None:
 
 
 def test_layout_of_the_state_vector() -> None:
-    assert layout_of(Window()) == (1, 3, 4, 2, 16, 18, 19, 20)
+    assert layout_of(Window()) == (1, 3, 4, 2, 16, 0, 16, 18, 19, 20)
+    assert layout_of(Window(hysteresis=(1.0, 5.0))) == (1, 3, 4, 2, 16, 2, 18, 20, 21, 24)
     assert layout_of(Window(2, 4)) == (2, 4, 8, 4, 44, 48, 50, 52)
     assert [*layout_of(Window(2)).angles] == [0, 4]
     assert layout_of(Window(2)).pressures == [2, 3, 6, 7]

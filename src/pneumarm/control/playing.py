@@ -12,6 +12,7 @@ It is for virtual arms without faults or further sensors, and for agents of the 
 moved by :mod:`~.turns`.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -36,7 +37,7 @@ from pneumarm.learning.online.settings import Exploration
 from pneumarm.learning.online.values import ActionValues, learner
 from pneumarm.random import random_state
 from pneumarm.simulation.kernel import remember, shift, stops_by_angle
-from pneumarm.simulation.layout import Layout, angle_at, layout_of, reading_at
+from pneumarm.simulation.layout import Layout, layout_of, reading_at
 from pneumarm.task.begin import draw_goal_near
 from pneumarm.task.movements import Movements, movements
 from pneumarm.task.noting import goes_on, note_action
@@ -92,6 +93,8 @@ class _Mind(NamedTuple):
     """Shape (joints, 2)."""
     by_angle: NDArray[np.float32]
     """Change of stop operators by that of their angle, both scaled, shape (joints, remembered)."""
+    angle: Array
+    """At the reading before, NaN before the first, shape (joints,) [counts]."""
     command: NDArray[np.float32]
     """Workspace, shape (2 joints,) [scaled]."""
 
@@ -170,6 +173,7 @@ class Player:
             np.ascontiguousarray(window.of_joints(scaling.observation_scale), np.float64),
             np.ascontiguousarray(scaling.command_scale.reshape(joints, 2), np.float64),
             stops_by_angle(window, scaling),
+            np.full(joints, np.nan),
             np.zeros(2 * joints, np.float32),
         )
         both = joints, 2
@@ -316,19 +320,19 @@ def _reach(body: Body, watched: _Guard, rules: _Rules, durations: Array) -> None
 def _push(mind: _Mind, watched: _Guard, velocity: Array, first: bool) -> None:
     """Put what was read into the state window, as :class:`~pneumarm.task.tracker.StateTracker` does."""
     sigma, layout = mind.sigma, mind.layout
+    for j in range(velocity.size):
+        if not math.isnan(mind.angle[j]):
+            moved = np.float32((watched.angle[j] - mind.angle[j]) / mind.scale[j, 0])
+            remember(layout, mind.by_angle[j], sigma, j, moved, np.float32(1.0))
+        mind.angle[j] = watched.angle[j]
     if first:
-        sigma[:] = 0
+        sigma[: layout.memory] = 0
     else:
         for j in range(velocity.size):
             for m in range(2):
                 valve = np.float64(watched.applied[j, m]) / mind.command_scale[j, m]
                 mind.command[2 * j + m] = np.float32(valve)
         shift(layout, sigma, mind.command)
-        for j in range(velocity.size):
-            moved = (
-                np.float32((watched.angle[j] - mind.offset[j, 0]) / mind.scale[j, 0]) - sigma[angle_at(layout, 0, j)]
-            )
-            remember(layout, mind.by_angle[j], sigma, j, moved, np.float32(1.0))
     for j in range(velocity.size):
         for q in range(4):
             value = watched.angle[j] if q == 0 else (velocity[j] if q == 1 else watched.pressure[j, q - 2])

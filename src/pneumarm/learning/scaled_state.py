@@ -26,6 +26,6 @@ def state_words(window: Window) -> str:
         f"state: the observations of the last {window.history} control periods, newest first, each of "
         f"{window.observation_size} numbers in sensor units (of each joint angle [counts], velocity [counts/ms], "
         "pressures of muscle 1 and 2 [counts], then further sensors), and after them the commands of the "
-        f"{window.history - 1} periods before, newest first{stops}. In the first period, with the arm at rest, all periods "
-        "are alike, velocities and commands 0."
+        f"{window.history - 1} periods before, newest first{stops}. In the first period, with the arm at rest, all "
+        "periods are alike, velocities and commands 0."
     )

@@ -40,7 +40,7 @@ class Window:
     further: tuple[str, ...] = ()
     """Names of further sensors whose readings an observation ends in, as in :attr:`~pneumarm.arm.ArmSpec.further`."""
     hysteresis: tuple[float, ...] = ()
-    """Radii of the stop operators of each joint (:mod:`.hysteresis`) [counts]; the state ends in what these are at."""
+    """Radii of the stop operators of each joint (:mod:`.hysteresis`) [counts]; the state ends in where these are."""
 
     @classmethod
     def of(

@@ -4,6 +4,7 @@ import shutil
 import subprocess
 import sys
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -17,12 +18,13 @@ from pneumarm.arm.reference import Reference
 from pneumarm.errors import PneumarmError
 from pneumarm.learning.servo.agent import ServoAgent
 from pneumarm.learning.servo.as_c import as_c
-from pneumarm.learning.servo.board import BoardController
+from pneumarm.learning.servo.board import BoardController, quantised
 from pneumarm.learning.servo.controller import ServoController
+from pneumarm.learning.servo.quantised import BLOCK, ONE, Quantised, quantised_of, run_quantised, units_of
 from pneumarm.learning.servo.settings import ServoSettings
 from pneumarm.learning.servo.task import servo_sizes
 from pneumarm.learning.servo.translate import Array, Known, Translator
-from pneumarm.networks.layers import initial_weights
+from pneumarm.networks.layers import initial_weights, split
 
 COMPILERS = [name for name in ("gcc", "clang") if shutil.which(name)]
 needs_compiler = pytest.mark.skipif(not COMPILERS, reason="needs a C compiler")
@@ -44,9 +46,11 @@ def turns_for(agent: ServoAgent, movements: int, steps: int, follows: bool) -> l
     return turns_of(np.random.default_rng(7), agent.spec, agent.goal_range, path, movements, steps, follows)
 
 
-def decided(agent: ServoAgent, turns: list[Turn], follows: bool) -> NDArray[np.float64]:
+def decided(
+    agent: ServoAgent, turns: list[Turn], follows: bool, small: Quantised | None = None
+) -> NDArray[np.float64]:
     """Return the commands (n, joints, 2) that the original gives."""
-    controller, middle = BoardController(agent), agent.goal_range.mean(axis=1)
+    controller, middle = BoardController(agent, small), agent.goal_range.mean(axis=1)
     found = []
     for turn in turns:
         if turn.begins:
@@ -54,6 +58,15 @@ def decided(agent: ServoAgent, turns: list[Turn], follows: bool) -> NDArray[np.f
             controller.track(Reference(lambda time: middle, stays=not follows))
         found.append(controller.step(turn.angle, turn.pressure, turn.path))
     return np.array(found)
+
+
+def in_plain_python(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let kernels be the plain functions that they are compiled from."""
+    for name, module in list(sys.modules.items()):
+        if name.startswith("pneumarm."):
+            for one, value in list(vars(module).items()):
+                if callable(getattr(value, "py_func", None)):
+                    monkeypatch.setattr(module, one, value.py_func)
 
 
 KINDS = [(1, 0, {}), (2, 0, {}), (1, 3, {}), (1, 0, {"muscles": 1}), (1, 0, {"pulses": False})]
@@ -84,11 +97,7 @@ def test_c_agrees_to_the_last_bit_with_plain_python(
     agent = agent_of(hidden=(8, 8))
     turns = turns_for(agent, 25, 60, follows)
     found = InC(agent, tmp_path, compiler=compiler, flags=CHECKED).command(turns, follows)
-    for name, module in list(sys.modules.items()):
-        if name.startswith("pneumarm."):
-            for one, value in list(vars(module).items()):
-                if callable(getattr(value, "py_func", None)):
-                    monkeypatch.setattr(module, one, value.py_func)
+    in_plain_python(monkeypatch)
     np.testing.assert_array_equal(found, decided(agent, turns, follows))
 
 
@@ -112,6 +121,54 @@ def test_in_single_precision_it_decides_much_the_same(tmp_path: Path) -> None:
     turns = turns_for(agent, 100, 60, False)
     found, exactly = (InC(agent, tmp_path, single=single).command(turns, False) for single in (True, False))
     assert (np.abs(found - exactly) < 1e-3).mean() > 0.99
+
+
+@needs_compiler
+@pytest.mark.parametrize("compiler", COMPILERS)
+def test_in_whole_numbers_c_agrees_to_the_last_bit(
+    compiler: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    agent = agent_of(hidden=(10, 6))
+    small, turns = quantised(agent), turns_for(agent, 25, 60, False)
+    found = InC(agent, tmp_path, small, compiler=compiler, flags=CHECKED).command(turns, False)
+    in_plain_python(monkeypatch)
+    np.testing.assert_array_equal(found, decided(agent, turns, False, small))
+
+
+def test_whole_numbers_are_those_of_numpy_and_near_the_floats() -> None:
+    agent, random = agent_of(), np.random.default_rng(0)
+    inputs = random.normal(0.0, [[0.5] * 22 + [2.0] * (agent.sizes[0] - 22)], (3000, agent.sizes[0])).astype(
+        np.float32
+    )
+    small = quantised_of(agent, inputs)
+    units, said = units_of(agent.sizes), np.zeros((agent.sizes[-1], 1), np.float32)
+    found = []
+    for one in inputs:
+        run_quantised(small, one[:, None], units, said)
+        found.append(said[:, 0].copy())
+    np.testing.assert_array_equal(found, said_by_numpy(small, inputs))
+    exactly = inputs.astype(np.float64)
+    for number, layer in enumerate(split(agent.policy, agent.sizes)):
+        exactly = np.tanh(exactly) if number else exactly
+        exactly = exactly @ layer[:-1] + layer[-1]
+    scatter = exactly.std(axis=0)
+    assert (np.abs(found - exactly).std(axis=0) < 0.05 * scatter).all()
+
+
+def said_by_numpy(small: Quantised, inputs: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return what a network in whole numbers says (n, outputs), worked out with NumPy's for all inputs at once."""
+    u = (np.clip(inputs * small.into, -8191, 8191) + np.float32(8192.5)).astype(np.int64) - 8192
+    place = row = 0
+    for number, (count, wide) in enumerate(pairwise(small.sizes.tolist())):
+        padded = -(-count // BLOCK) * BLOCK
+        n = small.weights[place : place + wide * padded].astype(np.int64).reshape(wide, padded)[:, :count]
+        high = np.clip((u @ n.T) >> (3 if number else 8), -32767, 32767)
+        z = ((high * small.factor[row : row + wide]) >> 8) + small.bias[row : row + wide]
+        size = np.minimum(np.abs(z), 96 * 256)
+        low, after = (small.bent.astype(np.int64)[(size >> 8) + k] for k in (0, 1))
+        u = np.sign(z) * ((low + (((after - low) * (size & 255)) >> 8) + 16) >> 5)
+        place, row = place + wide * padded, row + wide
+    return (z / ONE).astype(np.float32)
 
 
 def test_a_board_decides_as_the_controller_that_neither_plans_nor_looks_ahead() -> None:

@@ -40,6 +40,8 @@ def as_c(agent: ServoAgent, quantised: Quantised | None = None) -> str:
     whole.function(run, network, _field(board, "inputs"), units, _field(board, "said"))
     whole.function(act_board, servo, board, pressure, pressure)
     written = whole.text()
+    if quantised is not None:
+        written = _with_products_by_hand(written)
     numbers = {
         "JOINTS": joints,
         "PATH": path[0],
@@ -49,6 +51,8 @@ def as_c(agent: ServoAgent, quantised: Quantised | None = None) -> str:
         "LOWEST": float(agent.goal_range[0, 0]),
         "HIGHEST": float(agent.goal_range[0, 1]),
         "MOST_PRESSURE": spec.max_pressure_counts,
+        "COUNTS_PER_BAR": spec.counts_per_bar,
+        "MOST_INFLATION": spec.max_inflation,
     }
     parts = [
         f"/* For {_safe(spec.name)}, {1 / spec.period:g} Hz, {spec.counts_per_degree:g} counts per degree, "
@@ -60,6 +64,14 @@ def as_c(agent: ServoAgent, quantised: Quantised | None = None) -> str:
     template = resources.files("pneumarm.learning.servo").joinpath("servo.c").read_text(encoding="utf-8")
     text = template.replace("/* PARAMETERS */", "\n".join([*parts, written]))
     return text.replace("/* NETWORK */", run.__name__)
+
+
+def _with_products_by_hand(written: str) -> str:
+    """Return it with the sums of products that the AVR's compiler makes slow ones of."""
+    by_hand = resources.files("pneumarm.learning.servo").joinpath("products.c").read_text(encoding="utf-8")
+    begin = written.index("/* Return the sum of count products")
+    end = written.index("/*", written.rindex("/* Return the sum of count products") + 2)
+    return f"{written[:begin]}{by_hand}#else\n{written[begin:end].rstrip()}\n#endif\n\n{written[end:]}"
 
 
 def _field(of: Kept, name: str) -> Kept:

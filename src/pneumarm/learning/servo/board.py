@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pneumarm.arm.guard import guarded
 from pneumarm.arm.reference import Reference, constant
 from pneumarm.arm.seam import Reading, checked
 from pneumarm.kernels import kernel
@@ -36,15 +37,18 @@ from pneumarm.learning.servo.correction import (
 from pneumarm.learning.servo.following import TAUGHT_BY
 from pneumarm.learning.servo.inputs import SeenParameters, input_size, write_inputs
 from pneumarm.learning.servo.networks import Network, network_of, run_network
-from pneumarm.learning.servo.quantised import Quantised, run_quantised
+from pneumarm.learning.servo.quantised import Quantised, Units, quantised_of, run_quantised, units_of
 from pneumarm.learning.servo.rest import rest_parameters, resting
 from pneumarm.learning.servo.spreading import spread_pulses
+from pneumarm.simulation.arm import SimulationArm
 from pneumarm.simulation.layout import Layout
 from pneumarm.task.tracker import write_observation
 
 Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
 Bools = NDArray[np.bool_]
+
+_GOALS, _HELD = 40, 1.5  # goals that inputs are looked at for, and for how long each [s]
 
 
 class BoardParameters(NamedTuple):
@@ -75,9 +79,8 @@ class BoardState(NamedTuple):
     observation: Floats
     command: Floats
     """Given last, scaled, shape (2 joints,)."""
-    state: Singles
     x: Singles
-    """The same window, shape (state_size, 1)."""
+    """The window, shape (state_size, 1)."""
     stays: Bools
     moves: Bools
     remains: Bools
@@ -107,8 +110,8 @@ def begin_board(parameters, board):  # type: ignore[no-untyped-def]
     """Begin an episode: the arm is at rest with closed valves, and was perhaps moved by others."""
     board.fresh[0] = True
     board.rest.seen[0] = 0
-    for i in range(board.state.shape[0]):
-        board.state[i] = np.float32(0.0)
+    for i in range(board.x.shape[0]):
+        board.x[i, 0] = np.float32(0.0)
     for i in range(board.command.shape[0]):
         board.command[i] = 0.0
     ask_board(parameters, board)
@@ -149,7 +152,7 @@ def see_board(parameters, board, angle, pressure, path, follows):  # type: ignor
         for j in range(joints):
             board.error[j] = path[1, j] - angle[j] if board.moves[j] else 0.0
         learn_correction(parameters.correction, board.weights, board.largest, board.error, board.features)
-    preview_board(parameters, board, path)
+    preview_board(parameters, board, path, follows)
     write_inputs(
         parameters.inputs, board.x, parameters.silence, parameters.layout.history - 1, board.preview, board.inputs
     )
@@ -163,19 +166,18 @@ def observe_board(parameters, board, angle, pressure):  # type: ignore[no-untype
         board.observation[4 * j + 2] = pressure[j, 0]
         board.observation[4 * j + 3] = pressure[j, 1]
     write_observation(
-        parameters.layout, parameters.scale, board.observation, board.fresh[0], board.command, board.state
+        parameters.layout, parameters.scale, board.observation, board.fresh[0], board.command, board.x.ravel()
     )
     board.fresh[0] = False
-    for i in range(board.state.shape[0]):
-        board.x[i, 0] = board.state[i]
 
 
 @kernel
-def preview_board(parameters, board, path):  # type: ignore[no-untyped-def]
+def preview_board(parameters, board, path, follows):  # type: ignore[no-untyped-def]
     """Write where the reference will be, as the policy is asked for it, ``board.preview``."""
     for p in range(board.preview.shape[0]):
         ahead = parameters.inputs.steps[p]
-        write_features(path, ahead, parameters.middle, board.features)
+        if follows:
+            write_features(path, ahead, parameters.middle, board.features)
         for j in range(board.moves.shape[0]):
             added = board.rest.bias[j]
             if board.moves[j]:
@@ -231,7 +233,6 @@ def board_state(parameters: BoardParameters, ways: tuple[float, ...] = ()) -> Bo
         fresh=np.ones(1, bool),
         observation=np.zeros(layout.observed),
         command=np.zeros(2 * joints),
-        state=np.zeros(size, np.float32),
         x=np.zeros((size, 1), np.float32),
         stays=np.zeros(joints, bool),
         moves=np.zeros(joints, bool),
@@ -263,8 +264,9 @@ class BoardController:
         self.parameters = board_parameters(agent)
         self.state = board_state(self.parameters, agent.settings.ways)
         self.network: Network | Quantised = network_of(agent) if quantised is None else quantised
-        kind = np.float32 if quantised is None else np.int16
-        self.units = np.zeros((2, max(agent.sizes)), kind)
+        self.units: Singles | Units = (
+            units_of(agent.sizes) if quantised else np.zeros((2, max(agent.sizes)), np.float32)
+        )
         self._ahead = int(self.parameters.inputs.steps.max())
         self._reference, self._begin = constant(self.goal_range.mean(axis=1)), -1.0
         self._before: Floats | None = None
@@ -312,3 +314,17 @@ class BoardController:
         command = np.empty(pressure.shape)
         act_board(parameters, board, pressure, command)
         return command
+
+
+def quantised(agent: ServoAgent, seed: int = 0) -> Quantised:
+    """Return the network of ``agent`` in whole numbers, scaled by what it sees while it moves its simulation."""
+    controller, random, seen = BoardController(agent), np.random.default_rng(seed), []
+    low, high = agent.goal_range.T
+    with guarded(SimulationArm(agent.simulation, seed=seed)) as arm:
+        for _ in range(_GOALS):
+            controller.reset(low + (high - low) * random.random(arm.spec.joints))
+            for _ in range(round(_HELD / arm.spec.period)):
+                arm.decide(controller.act(arm.read()))
+                seen.append(controller.state.inputs[:, 0].copy())
+                arm.wait(arm.spec.period)
+    return quantised_of(agent, np.array(seen))

@@ -17,7 +17,7 @@ import inspect
 import operator
 import textwrap
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NoReturn, TypeGuard
 
 import numpy as np
@@ -38,6 +38,7 @@ _OPERATORS: dict[type[ast.operator], tuple[str, Callable[[Any, Any], Any]]] = {
     ast.FloorDiv: ("/", operator.floordiv),
     ast.Mod: ("%", operator.mod),
     ast.RShift: (">>", operator.rshift),
+    ast.LShift: ("<<", operator.lshift),
 }
 """What both languages have; the division and the rest of whole numbers are the same where these are not negative."""
 _COMPARISONS: dict[type[ast.cmpop], tuple[str, Callable[[Any, Any], bool]]] = {
@@ -324,6 +325,10 @@ class _Function:
                 return self._compared(node, [left, *others], ops)
             case ast.IfExp(test=test, body=body, orelse=other):
                 return self._chosen(node, self._number(test), self._number(body), self._number(other))
+            case ast.Call(func=ast.Attribute(value=value, attr="ravel"), args=[]):
+                array = self._as_array(self._value(value))
+                assert isinstance(array, Array)
+                return replace(array, shape=(int(np.prod(array.shape)),))
             case ast.Call():
                 return self._call(node)
             case _:
@@ -416,7 +421,7 @@ class _Function:
         kind = max(kinds, key=_ORDER.index, default="int")
         if isinstance(op, ast.Div) and kind in ("int", "int32"):
             self._refuse(node, "a division of whole numbers: say float(...) of one")
-        if isinstance(op, ast.RShift):
+        if isinstance(op, ast.RShift | ast.LShift):
             kind = left.kind
         if left.value is not None and right.value is not None and kind == "int":
             return self._known(of(left.value, right.value))

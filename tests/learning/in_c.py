@@ -48,15 +48,18 @@ class InC:
         self._library.servo_act.argtypes = [pointer, pointer, pointer, ctypes.c_bool, pointer]
         self._joints = agent.spec.joints
 
+    def next(self, begins: bool, angle: Floats, pressure: Floats, path: Floats, follows: bool = False) -> Floats:
+        """Return the command (joints, 2) after a reading, the first of a movement that ``begins``."""
+        if begins:
+            self._library.servo_begin()
+        command = np.zeros((self._joints, 2), self._kind)
+        given = (one.astype(self._kind) for one in (angle, pressure, path))
+        self._library.servo_act(*given, follows, command)
+        return command.astype(np.float64)
+
     def command(self, turns: list[Turn], follows: bool) -> Floats:
         """Return the commands (n, joints, 2) of a new movement for each of the ``turns`` that begins one."""
-        commands = np.zeros((len(turns), self._joints, 2), self._kind)
-        for turn, command in zip(turns, commands, strict=True):
-            if turn.begins:
-                self._library.servo_begin()
-            angle, pressure, path = (one.astype(self._kind) for one in turn[1:])
-            self._library.servo_act(angle, pressure, path, follows, command)
-        return commands.astype(np.float64)
+        return np.array([self.next(*turn, follows=follows) for turn in turns])
 
 
 def turns_of(

@@ -12,7 +12,6 @@ It is for virtual arms without faults or further sensors, and for agents of the 
 moved by :mod:`~.turns`.
 """
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -37,7 +36,7 @@ from pneumarm.learning.online.settings import Exploration
 from pneumarm.learning.online.values import ActionValues, learner
 from pneumarm.random import random_state
 from pneumarm.simulation.kernel import remember, shift, stops_by_angle
-from pneumarm.simulation.layout import Layout, layout_of, reading_at
+from pneumarm.simulation.layout import Layout, angle_at, layout_of, reading_at
 from pneumarm.task.begin import draw_goal_near
 from pneumarm.task.movements import Movements, movements
 from pneumarm.task.noting import goes_on, note_action
@@ -93,8 +92,6 @@ class _Mind(NamedTuple):
     """Shape (joints, 2)."""
     by_angle: NDArray[np.float32]
     """Change of stop operators by that of their angle, both scaled, shape (joints, remembered)."""
-    angle: Array
-    """At the reading before, NaN before the first, shape (joints,) [counts]."""
     command: NDArray[np.float32]
     """Workspace, shape (2 joints,) [scaled]."""
 
@@ -173,7 +170,6 @@ class Player:
             np.ascontiguousarray(window.of_joints(scaling.observation_scale), np.float64),
             np.ascontiguousarray(scaling.command_scale.reshape(joints, 2), np.float64),
             stops_by_angle(window, scaling),
-            np.full(joints, np.nan),
             np.zeros(2 * joints, np.float32),
         )
         both = joints, 2
@@ -320,14 +316,12 @@ def _reach(body: Body, watched: _Guard, rules: _Rules, durations: Array) -> None
 def _push(mind: _Mind, watched: _Guard, velocity: Array, first: bool) -> None:
     """Put what was read into the state window, as :class:`~pneumarm.task.tracker.StateTracker` does."""
     sigma, layout = mind.sigma, mind.layout
-    for j in range(velocity.size):
-        if not math.isnan(mind.angle[j]):
-            moved = np.float32((watched.angle[j] - mind.angle[j]) / mind.scale[j, 0])
-            remember(layout, mind.by_angle[j], sigma, j, moved, np.float32(1.0))
-        mind.angle[j] = watched.angle[j]
     if first:
-        sigma[: layout.memory] = 0
+        sigma[:] = 0
     else:
+        for j in range(velocity.size):
+            angle = np.float32((watched.angle[j] - mind.offset[j, 0]) / mind.scale[j, 0])
+            remember(layout, mind.by_angle, sigma, j, angle - sigma[angle_at(layout, 0, j)], np.float32(1.0))
         for j in range(velocity.size):
             for m in range(2):
                 valve = np.float64(watched.applied[j, m]) / mind.command_scale[j, m]

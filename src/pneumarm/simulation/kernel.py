@@ -210,11 +210,12 @@ def shift(layout, x, command):  # type: ignore[no-untyped-def]
 def remember(layout, by_angle, x, joint, moved, most):  # type: ignore[no-untyped-def]
     """Let the stop operators of ``joint`` in ``x`` follow an angle that has ``moved``, up to ``most`` either way.
 
-    All is scaled: ``by_angle`` (remembered,) is the change of each operator, whose ends are -1 and 1, by the angle's.
+    All is scaled: ``by_angle`` (joints, remembered) is the change of operators, whose ends are -1 and 1, by the
+    angle's.
     """
     for i in range(layout.remembered):
         place = layout.memory + joint * layout.remembered + i
-        x[place] = min(max(x[place] + by_angle[i] * moved, -most), most)
+        x[place] = min(max(x[place] + by_angle[joint, i] * moved, -most), most)
 
 
 def stops_by_angle(window: Window, scaling: Scaling) -> NDArray[np.float32]:
@@ -229,7 +230,7 @@ def push(simulation, x, change, command):  # type: ignore[no-untyped-def]
     layout = simulation.layout
     shift(layout, x, command)
     for joint in range(layout.joints):
-        remember(layout, simulation.stops[joint], x, joint, -x[angle_at(layout, 0, joint)], np.float32(np.inf))
+        remember(layout, simulation.stops, x, joint, -x[angle_at(layout, 0, joint)], np.float32(np.inf))
     for joint in range(simulation.velocity.shape[0]):
         x[velocity_at(layout, 0, joint)] = x[angle_at(layout, 0, joint)]
     for o in range(change.shape[0]):
@@ -240,7 +241,7 @@ def push(simulation, x, change, command):  # type: ignore[no-untyped-def]
         moved = x[angle_at(layout, 0, joint)] - x[velocity]
         x[velocity] = moved * simulation.velocity[joint, 0] + simulation.velocity[joint, 1]
     for joint in range(layout.joints):
-        remember(layout, simulation.stops[joint], x, joint, x[angle_at(layout, 0, joint)], np.float32(1.0))
+        remember(layout, simulation.stops, x, joint, x[angle_at(layout, 0, joint)], np.float32(1.0))
 
 
 @part

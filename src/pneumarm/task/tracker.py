@@ -7,10 +7,32 @@ from numpy.typing import ArrayLike, NDArray
 
 from pneumarm.arm.seam import Reading, measured
 from pneumarm.arm.velocity import derived_velocity
+from pneumarm.kernels import kernel
 from pneumarm.simulation.kernel import remember, shift, stops_by_angle
-from pneumarm.simulation.layout import layout_of
+from pneumarm.simulation.layout import angle_at, layout_of
 from pneumarm.simulation.simulation import Scaling
 from pneumarm.transitions.window import QUANTITIES, Window
+
+
+@kernel
+def write_observation(layout, scale, by_angle, observation, first, command, state):  # type: ignore[no-untyped-def]
+    """Put the newest ``observation`` [counts] into the window at the begin of ``state``, the scaled ``command`` too.
+
+    ``scale`` holds the offsets and scales of observations, ``by_angle`` (joints, remembered) the change of stop
+    operators by that of their angle. The ``first`` observation of an episode fills the whole window.
+    """
+    if not first:
+        for joint in range(layout.joints):
+            angle = angle_at(layout, 0, joint)
+            moved = np.float32((observation[angle] - scale[0, angle]) / scale[1, angle]) - state[angle]
+            remember(layout, by_angle, state, joint, moved, np.float32(1.0))
+        shift(layout, state, command)
+    for i in range(layout.observed):
+        newest = np.float32((observation[i] - scale[0, i]) / scale[1, i])
+        state[i] = newest
+        if first:
+            for lag in range(1, layout.history):
+                state[lag * layout.observed + i] = newest
 
 
 class StateTracker:
@@ -23,22 +45,20 @@ class StateTracker:
 
     def __init__(self, window: Window, scaling: Scaling) -> None:
         self.window = window
-        self._offset, self._scale = scaling.observation_offset, scaling.observation_scale
+        self._scale = np.stack([scaling.observation_offset, scaling.observation_scale])
         self._layout = layout_of(window)
         self._measures = window.velocity == "measured"
         self._command_scale = scaling.command_scale
         self._by_angle = stops_by_angle(window, scaling)
-        self._state = np.zeros(window.state_size, np.float32)
-        self._angle: NDArray[np.float64] | None = None
         self.reset()
 
     def reset(self) -> None:
-        """Begin an episode: the next reading is one at rest. How a joint came to where it is stays known."""
+        """Begin an episode: the next reading is one at rest."""
         self.velocity: NDArray[np.float64] = np.zeros(self.window.joints)
         """Angular velocities at the newest reading, shape (joints,) [counts/ms]."""
         self._time = 0.0
-        self._first = True
-        self._state[: self._layout.memory] = 0.0
+        self._angle: NDArray[np.float64] | None = None
+        self._state = np.zeros(self.window.state_size, np.float32)
         self._command = np.zeros(self.window.command_size)
 
     def push(
@@ -52,28 +72,19 @@ class StateTracker:
         window, state = self.window, self._state
         angle = np.array(angle, np.float64).reshape(window.joints)
         observed = window.observation_size
-        first, before = self._first, self._angle
+        first = self._angle is None
         if self._measures:
             self.velocity = np.array(measured[: window.joints], np.float64)
-        elif before is not None and not first and time > self._time:
-            self.velocity = derived_velocity(angle, before, time - self._time)
-        self._time, self._angle, self._first = time, angle, False
+        elif self._angle is not None and time > self._time:
+            self.velocity = derived_velocity(angle, self._angle, time - self._time)
+        self._time, self._angle = time, angle
         observation = np.empty(observed)
         joints = window.of_joints(observation)
         joints[:, 0], joints[:, 1] = angle, self.velocity
         joints[:, 2:] = np.asarray(pressure, np.float64).reshape(window.joints, 2)
         if window.further:
             observation[window.joint_size :] = measured[-len(window.further) :]
-        newest = (observation - self._offset) / self._scale
-        if first:
-            state[: window.history * observed] = np.tile(newest, window.history)
-        else:
-            shift(self._layout, state, self._command)  # ten times as fast as in plain Python
-            state[:observed] = newest
-        if before is not None and window.hysteresis:
-            moved = (angle - before) / window.of_joints(self._scale)[:, 0]
-            for joint in range(window.joints):
-                remember(self._layout, self._by_angle[joint], state, joint, np.float32(moved[joint]), np.float32(1.0))
+        write_observation(self._layout, self._scale, self._by_angle, observation, first, self._command, state)
         return state.copy()
 
     def reading(self, reading: Reading) -> NDArray[np.float32]:

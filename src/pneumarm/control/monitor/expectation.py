@@ -116,7 +116,7 @@ def expect_by_simulation(predictor, readings, memory):  # type: ignore[no-untype
         x[layout.memory + i] = memory.stops[i]
     for j in range(layout.joints):
         moved = np.float32((memory.observed[0, j, 0] - memory.observed[1, j, 0]) / predictor.scale[j, 0])
-        remember(layout, predictor.simulation.stops[j], x, j, moved, np.float32(1.0))
+        remember(layout, predictor.simulation.stops, x, j, moved, np.float32(1.0))
     for i in range(memory.stops.shape[0]):
         memory.stops[i] = x[layout.memory + i]
     for h in range(memory.expected.shape[0]):

@@ -32,7 +32,8 @@ needs_compiler = pytest.mark.skipif(not COMPILERS, reason="needs a C compiler")
 
 def agent_of(joints: int = 1, steps: int = 0, hidden: tuple[int, ...] = (48, 48), **spec: object) -> ServoAgent:
     """Return an agent that was recorded with pulses; what it learned does not matter here."""
-    simulation, settings = synthetic_simulation(joints), ServoSettings(hidden=hidden, planned=0, coarse=0.2)
+    simulation = synthetic_simulation(joints, hysteresis=(15.0, 60.0) if joints > 1 else ())
+    settings = ServoSettings(hidden=hidden, planned=0, coarse=0.2)
     if steps:
         simulation = in_steps(simulation, steps)
     simulation = replace(simulation, error_std=simulation.error_std / 4, commands="pulses")

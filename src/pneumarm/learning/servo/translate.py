@@ -116,6 +116,8 @@ class Translator:
         kind = _STORED[value.dtype.name]
         if constant and value.dtype.name == "int64" and not (np.abs(value) <= np.iinfo(np.int16).max).all():
             raise PneumarmError(f"{name}: whole numbers of 16 bits are wanted")
+        if not value.size:  # C has no empty arrays; nobody reads this number
+            value = np.zeros((1,) * value.ndim, value.dtype)
         if name not in self.tables:
             if not constant and not value.any():
                 self.tables[name] = f"static {kind} {name}[{value.size}];"

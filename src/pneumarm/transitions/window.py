@@ -116,6 +116,12 @@ class Window:
         """Numbers in sigma and the action: the input of the simulation's networks."""
         return self.state_size + self.command_size
 
+    @property
+    def commanded(self) -> NDArray[np.int64]:
+        """Places of the commands in an input, past ones and the newest."""
+        past = np.arange(self.history * self.observation_size, self.state_size - self.memory_size)
+        return np.concatenate([past, np.arange(self.state_size, self.input_size)])
+
     def remembered(self, inputs: NDArray[Any], observation: NDArray[Any]) -> NDArray[Any]:
         """Return where stop operators are (n, memory_size) once ``observation`` (n, observation_size) is made.
 

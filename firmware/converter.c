@@ -8,9 +8,16 @@
 #include "clock.h"
 #include "latches.h"
 
+#ifdef FEW_CHANNELS
+/* A program that converts few channels has time for them: 16 MHz / 128 = 125 kHz, 104 us a conversion. */
+#define USED FEW_CHANNELS
+#define RUN (_BV(ADEN) | _BV(ADIE) | _BV(ADPS2) | _BV(ADPS1) | _BV(ADPS0))
+#else
 /* 16 MHz / 32 = 500 kHz: 26 us a conversion. That is faster than the 200 kHz up to which all ten bits are promised,
  * and costs less than one count; the medians take away more. */
+#define USED CHANNELS
 #define RUN (_BV(ADEN) | _BV(ADIE) | _BV(ADPS2) | _BV(ADPS0))
+#endif
 #define REFERENCE _BV(REFS0) /* the supply, which also feeds the potentiometers: its drift cancels */
 
 #define MOST_CONVERSIONS 9
@@ -34,7 +41,7 @@ static volatile uint8_t channel, sweep;
 static volatile uint8_t conversions = 5;
 static volatile uint8_t oldest; /* place in `recent` of all channels */
 /* Windows that are still to be filled, with one value each, when the conversions begin or their number changes. */
-static volatile uint8_t unfilled = CHANNELS;
+static volatile uint8_t unfilled = USED;
 
 static volatile uint8_t over[MUSCLES];
 static volatile uint16_t limit[MUSCLES] = {0x3ff, 0x3ff, 0x3ff, 0x3ff}; /* nothing is over the highest count */
@@ -97,7 +104,7 @@ ISR(ADC_vect)
 {
 	uint16_t value = ADC;
 	uint8_t done = channel;
-	uint8_t next = done + 1 == CHANNELS ? 0 : done + 1;
+	uint8_t next = done + 1 == USED ? 0 : done + 1;
 	/* Each conversion is started here, not by free running: there the channel of the conversion under way is one
 	 * behind the register. */
 	ADMUX = REFERENCE | next;
@@ -189,7 +196,7 @@ void converter_configure(uint8_t of, uint8_t over_ms, const uint16_t limits[MUSC
 	{
 		conversions = of;
 		oldest = 0;
-		unfilled = CHANNELS;
+		unfilled = USED;
 		velocity_ms = over_ms;
 		known_ms = 0;
 		no_past = true;

@@ -43,6 +43,10 @@ COMMANDS = {
         "Export a recording (CSV, Parquet, LeRobot, Minari) or an agent (ONNX, C).",
         "pneumarm export arm.agent --out agent.c",
     ),
+    "deploy": (
+        "Build a program by which a board moves its arm with an agent, without a computer.",
+        "pneumarm deploy arm.agent --board uno --out build",
+    ),
     "copy": (
         "Copy a store to another place: from a file to a server, or back.",
         "pneumarm copy arm.db postgresql://lab@server/rig1",

@@ -16,13 +16,19 @@ SCALE = np.array([400.0, 5.0, 90.0, 90.0])
 
 
 def synthetic_simulation(
-    joints: int = 1, history: int = 3, hidden: int = 10, direct: bool = False, second: bool = False
+    joints: int = 1,
+    history: int = 3,
+    hidden: int = 10,
+    direct: bool = False,
+    second: bool = False,
+    hysteresis: tuple[float, ...] = (),
 ) -> Simulation:
     """Return an arm whose angle springs towards 0.5 (p1 - p2) and whose valves change the pressures.
 
-    Its networks have one hidden layer; or a ``second`` one; or are ``direct``, without any.
+    Its networks have one hidden layer; or a ``second`` one; or are ``direct``, without any. By stop operators of the
+    radii in ``hysteresis`` [counts] it is held back.
     """
-    window = Window(joints, history)
+    window = Window(joints, history, hysteresis=hysteresis)
     networks = []
     for joint in range(joints):
         theta, p1, p2 = 4 * joint, 4 * joint + 2, 4 * joint + 3
@@ -32,6 +38,8 @@ def synthetic_simulation(
         if history > 1:
             spring[theta] += 0.5
             spring[older] = -0.5
+        memory = window.state_size - window.memory_size + joint * len(hysteresis)
+        spring |= dict.fromkeys(range(memory, memory + len(hysteresis)), -0.03)
         networks.append(_network(window, spring, hidden, joint, direct, second))
         networks.append(_network(window, {command: 0.2}, hidden, joint + 10, direct, second))
         networks.append(_network(window, {command + 1: 0.2}, hidden, joint + 20, direct, second))
@@ -99,5 +107,6 @@ KINDS_OF_SIMULATION = {
     "two joints, direct": synthetic_simulation(2, 2, direct=True),
     "history 1": synthetic_simulation(1, 1, direct=True),
     "two layers": synthetic_simulation(2, 2, second=True),
+    "two joints with hysteresis": synthetic_simulation(2, 2, hysteresis=(15.0, 60.0)),
 }
 """Of all that a gradient may have to go through."""

@@ -29,7 +29,8 @@ def raw_of(agent: ServoAgent | PolicyAgent, scaled: np.ndarray) -> np.ndarray:
     raw = scaled.astype(np.float64)
     raw[:, :observed] *= np.tile(scaling.observation_scale, window.history)
     raw[:, :observed] += np.tile(scaling.observation_offset, window.history)
-    raw[:, observed:] *= np.tile(scaling.command_scale, window.history - 1)
+    raw[:, observed : window.state_size - window.memory_size] *= np.tile(scaling.command_scale, window.history - 1)
+    raw[:, window.state_size - window.memory_size :] *= np.tile(window.hysteresis, window.joints)
     return raw.astype(np.float32)
 
 
@@ -37,7 +38,8 @@ def raw_of(agent: ServoAgent | PolicyAgent, scaled: np.ndarray) -> np.ndarray:
 def test_a_servo_as_onnx_decides_as_the_original(joints: int, history: int, steps: int) -> None:
     pytest.importorskip("onnx")
     runtime = pytest.importorskip("onnxruntime")
-    simulation, settings = synthetic_simulation(joints, history), ServoSettings()
+    simulation = synthetic_simulation(joints, history, hysteresis=(15.0, 60.0) if joints > 1 else ())
+    settings = ServoSettings()
     if steps:
         simulation = in_steps(simulation, steps)
     random = np.random.default_rng(joints)

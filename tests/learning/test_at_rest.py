@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from learning.synthetic_arm import synthetic_begin_states, synthetic_simulation
 from pneumarm.arm import Reading
 from pneumarm.learning.servo import ServoAgent, ServoSettings, train_servo
+from pneumarm.learning.servo.at_rest import drift_of, extent_of, mean_of, variance_of
 from pneumarm.learning.servo.controller import ServoController
 from pneumarm.learning.servo.foresight import Foresight
-from pneumarm.learning.servo.rest import extent, look_back, variance
 from pneumarm.learning.servo.two_ways import TwoWays
 from pneumarm.simulation.kernel import scaled_state
 
@@ -166,10 +166,11 @@ def test_being_thrown_far_off_counts_while_it_is_tried_and_another_goal_ends_tha
 @pytest.mark.parametrize("seen", [4, 7, 12])
 def test_readings_are_averaged_as_numpy_does(joints: int, seen: int) -> None:
     readings, look = np.random.default_rng(0).normal(500.0, 20.0, (seen, joints)), 4
-    mean, drift, span, scatter = np.empty((4, joints))
-    look_back(readings, look, mean, drift)
-    extent(readings, span)
-    variance(readings, scatter)
+    older = np.full((3, joints), np.nan)  # what is kept from before, and is not to count
+    mean, drift, span, scatter = (
+        np.array([of(np.vstack([older, readings]), seen, most, j) for j in range(joints)])
+        for of, most in ((mean_of, look), (drift_of, look), (extent_of, 20), (variance_of, 20))
+    )
     read = readings[-look:]
     np.testing.assert_allclose(mean, read.mean(axis=0), rtol=1e-14)
     np.testing.assert_allclose(drift, np.abs(read[-2:].mean(axis=0) - read[:2].mean(axis=0)), atol=1e-12)

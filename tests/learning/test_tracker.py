@@ -11,11 +11,12 @@ from pneumarm.transitions.rows import Rows
 from pneumarm.transitions.window import transitions
 
 
+@pytest.mark.parametrize("hysteresis", [(), (30.0, 150.0)])
 @pytest.mark.parametrize(("joints", "history"), [(1, 3), (1, 1), (2, 4), (3, 2)])
-def test_windows_are_those_of_the_transitions(joints: int, history: int) -> None:
+def test_windows_are_those_of_the_transitions(joints: int, history: int, hysteresis: tuple[float, ...]) -> None:
     """Uneven time stamps, random readings and valves; the same windows as a fit sees in the store."""
     random, n = np.random.default_rng(0), 30
-    simulation = synthetic_simulation(joints, history)
+    simulation = synthetic_simulation(joints, history, hysteresis=hysteresis)
     rows = Rows(
         np.zeros(n, np.int64), np.arange(n), np.cumsum(random.uniform(0.03, 0.037, n)),
         random.uniform(300, 700, (n, joints)), random.uniform(0, 180, (n, joints, 2)),

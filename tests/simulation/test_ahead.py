@@ -22,6 +22,7 @@ from pneumarm.simulation.ahead import (
 )
 from pneumarm.simulation.kernel import simulation_parameters
 from pneumarm.transitions import CollectSettings, Store, collect, held_out
+from pneumarm.transitions.hysteresis import RADII
 from pneumarm.transitions.rows import Rows
 
 STEPS = 6
@@ -110,7 +111,7 @@ def test_the_gradient_is_that_of_the_cost(store: Path, single: Simulation, layer
 def test_later_steps_are_predicted_better(store: Path, single: Simulation, layers: Literal[1, 2]) -> None:
     """And single ones about as well, on sequences that were not fitted."""
     with Store.open(store) as opened:
-        chosen = FitSettings(epochs=10, memory=1, layers=layers)
+        chosen = FitSettings(epochs=10, memory=1, hysteresis=(), layers=layers)
         single = single if layers == 1 else fit_store(opened, replace(chosen, ahead=0.0, spread=False)).simulation
         fitted = fit_store(opened, chosen).simulation
         blocks = [rows.where(held_out(rows.sequence, single.held_out, single.seed)) for rows in opened.blocks()]
@@ -118,6 +119,22 @@ def test_later_steps_are_predicted_better(store: Path, single: Simulation, layer
     later = [_errors(one, apart) for one in (single, fitted)]
     assert (later[1][0] < 1.1 * later[0][0]).all()
     assert later[1][-1, 0] < 0.97 * later[0][-1, 0]
+
+
+@pytest.mark.thorough
+def test_an_arm_that_sticks_is_foreseen_better_by_how_it_came_to_where_it_is(tmp_path: Path) -> None:
+    """A fifth of a second ahead; the simulation is stored with its radii."""
+    arm = open_arm("virtual:wide,seed=6001")
+    with Store.create(tmp_path / "arm.db", arm.spec) as opened:
+        collect(arm, opened, 6000)
+        forgetful, fitted = (fit_store(opened, FitSettings(hysteresis=radii)).simulation for radii in ((), None))
+        blocks = [rows.where(held_out(rows.sequence, fitted.held_out, fitted.seed)) for rows in opened.blocks()]
+    assert fitted.window.hysteresis == pytest.approx(np.multiply(RADII, arm.spec.counts_per_degree))
+    apart = (stretches(blocks, replace(one, held_out=0.0), STEPS) for one in (forgetful, fitted))
+    without, with_ = (_errors(one, found)[-1, 0] for one, found in zip((forgetful, fitted), apart, strict=True))
+    assert with_ < 0.8 * without
+    fitted.save(tmp_path / "arm.sim")
+    assert Simulation.load(tmp_path / "arm.sim").window == fitted.window
 
 
 def _errors(simulation: Simulation, found: Stretches) -> np.ndarray[Any, np.dtype[np.float64]]:

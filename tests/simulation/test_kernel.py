@@ -34,10 +34,11 @@ def made_up(
     velocity: str = "derived",
     direct: bool = False,
     second: bool = False,
+    hysteresis: tuple[float, ...] = (),
 ) -> Simulation:
     """Return a simulation with random networks of different sizes; ``outputs`` of each network."""
     random = np.random.default_rng(joints + 10 * history)
-    window = Window(joints, history)
+    window = Window(joints, history, hysteresis=hysteresis)
     outputs = outputs or [1] * (3 * joints if velocity == "derived" else 4 * joints)
     networks = []
     for i, count in enumerate(outputs):
@@ -87,7 +88,10 @@ def reference(simulation: Simulation, sigma: NDArray, command: NDArray) -> NDArr
         new[:, 1] = (new[:, 0] - old[:, 0]) / (1e3 * simulation.spec.period)
     observations = np.concatenate([new.ravel(), sigma[: (h - 1) * o]])
     commands = np.concatenate([command, sigma[h * o :]])[: (h - 1) * 2 * joints]
-    return np.concatenate([observations, commands])
+    moved = np.repeat(new[:, 0] - old[:, 0], len(window.hysteresis))
+    radii = np.tile(window.hysteresis, joints)
+    stops = np.clip(sigma[window.state_size - window.memory_size :] + moved, -radii, radii)
+    return np.concatenate([observations, commands, stops])
 
 
 @pytest.mark.parametrize(
@@ -103,6 +107,7 @@ def reference(simulation: Simulation, sigma: NDArray, command: NDArray) -> NDArr
         made_up(joints=2, outputs=[8], velocity="network", direct=True),
         made_up(second=True),
         made_up(joints=2, outputs=[6], second=True),
+        made_up(joints=2, hysteresis=(5.0, 20.0)),
     ],
     ids=[
         "thesis",
@@ -115,6 +120,7 @@ def reference(simulation: Simulation, sigma: NDArray, command: NDArray) -> NDArr
         "all of it",
         "two layers",
         "one network of two layers",
+        "hysteresis",
     ],
 )
 def test_twenty_steps_follow_the_definitions(simulation: Simulation) -> None:
@@ -123,7 +129,8 @@ def test_twenty_steps_follow_the_definitions(simulation: Simulation) -> None:
     parameters, noise = simulation_parameters(simulation), noise_parameters(QUIET, simulation)
     state = simulation_state(parameters, random_state(0))
     observation = np.tile([500.0, 0.2, 90.0, 80.0], joints)
-    sigma = np.concatenate([np.tile(observation, window.history), np.zeros((window.history - 1) * 2 * joints)])
+    others = np.zeros(window.state_size - window.history * window.observation_size)
+    sigma = np.concatenate([np.tile(observation, window.history), others])
     begin(parameters, noise, state, scaled_state(sigma, window, scaling))
     visited = []
     for _ in range(20):
@@ -168,8 +175,9 @@ def test_readings_stay_within_the_sensors(sign: int) -> None:
 
 
 def test_layout_of_the_state_vector() -> None:
-    assert layout_of(Window()) == (1, 3, 4, 2, 16, 18, 19, 20)
-    assert layout_of(Window(2, 4)) == (2, 4, 8, 4, 44, 48, 50, 52)
+    assert layout_of(Window()) == (1, 3, 4, 2, 16, 0, 16, 18, 19, 20)
+    assert layout_of(Window(hysteresis=(1.0, 5.0))) == (1, 3, 4, 2, 16, 2, 18, 20, 21, 24)
+    assert layout_of(Window(2, 4)) == (2, 4, 8, 4, 44, 0, 44, 48, 50, 52)
     assert [*layout_of(Window(2)).angles] == [0, 4]
     assert layout_of(Window(2)).pressures == [2, 3, 6, 7]
     assert list(accumulate([padded(n, 16) for n in (1, 16, 17)])) == [16, 32, 64]

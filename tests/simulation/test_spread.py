@@ -51,6 +51,8 @@ def test_on_average_pulses_do_what_whole_periods_do_as_often(made, store):
         goal_range=made.simulation.goal_range,
         settings=FitSettings(history=2, spread=False),
     ).simulation
+    others = np.setdiff1d(np.arange(asked.inputs.shape[1]), made.simulation.window.commanded)
+    np.testing.assert_array_equal(asked.inputs[:, others], known.inputs[:, others])
     assert made.simulation.spread
     assert not untaught.spread
     pressures = slice(2, None)

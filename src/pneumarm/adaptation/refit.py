@@ -255,9 +255,10 @@ def _advanced(
 ) -> NDArray[np.float32]:
     """Return the states (n, state_size) a step later."""
     past = window.history * window.observation_size
-    observed, commanded = sigma[:, :past], sigma[:, past:]
+    observed, commanded = sigma[:, :past], sigma[:, past : window.state_size - window.memory_size]
     commands = np.concatenate([command, commanded], axis=1)[:, : commanded.shape[1]]
-    return np.concatenate([observation, observed[:, : -window.observation_size], commands], axis=1)
+    memory = window.remembered(sigma, observation)
+    return np.concatenate([observation, observed[:, : -window.observation_size], commands, memory], axis=1)
 
 
 def _reaching(limits: Floats, read: NDArray[np.float32]) -> Floats:

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -32,6 +33,8 @@ from pneumarm.checkup.figures import JOINT_HEADER, MUSCLE_HEADER, joint_row, mus
 from pneumarm.commands.asking import AtTerminal, asked_for, calibrated, missing_of, resting
 from pneumarm.commands.common import Json, Measuring, Settings
 from pneumarm.console import say, show, table
+from pneumarm.control import open_agent
+from pneumarm.control.deploy import deploy
 from pneumarm.errors import ArmUnsound, UnusableInput
 from pneumarm.files import make_folder, require_folder, require_output, write_text
 from pneumarm.progress import Display, progress
@@ -441,16 +444,22 @@ def emulate_(arm: str, /, *, link: Path | None = None, seed: int = 0, json: Json
         serve(opened, tell, link=link)
 
 
-def flash_(port: str, /, *, json: Json = False) -> None:
+def flash_(port: str, /, *, agent: Path | None = None, json: Json = False) -> None:
     """Write the firmware that came with this pneumarm onto an Arduino Uno or Nano, with the air off; needs avrdude.
+
+    With an agent it is the program of ``pneumarm deploy``, by which the board moves the arm alone.
 
     Parameters
     ----------
     port
         Where the board is, such as /dev/ttyACM0 or serial:/dev/ttyACM0.
+    agent
+        The agent that the board is to move its arm with, alone.
     """
-    from pneumarm.arm.serial.flash import flash
+    from pneumarm.arm.serial.flash import FIRMWARE, flash
 
     place = port.removeprefix("serial:")
-    baud = flash(place)
+    with TemporaryDirectory() as folder:
+        program = FIRMWARE if agent is None else deploy(open_agent(agent, None), "uno", Path(folder)).hex
+        baud = flash(place, program)
     show({"port": place, "baud": baud}, json, lambda: [f"The board at {place} is flashed."])

@@ -35,8 +35,8 @@ from pneumarm.learning.online.schedule import Schedule
 from pneumarm.learning.online.settings import Exploration
 from pneumarm.learning.online.values import ActionValues, learner
 from pneumarm.random import random_state
-from pneumarm.simulation.kernel import shift
-from pneumarm.simulation.layout import Layout, layout_of, reading_at
+from pneumarm.simulation.kernel import remember, shift, stops_by_angle
+from pneumarm.simulation.layout import Layout, angle_at, layout_of, reading_at
 from pneumarm.task.begin import draw_goal_near
 from pneumarm.task.movements import Movements, movements
 from pneumarm.task.noting import goes_on, note_action
@@ -90,6 +90,8 @@ class _Mind(NamedTuple):
     """Shape (joints, 4) [sensor units]."""
     command_scale: Array
     """Shape (joints, 2)."""
+    by_angle: NDArray[np.float32]
+    """Change of stop operators by that of their angle, both scaled, shape (joints, remembered)."""
     command: NDArray[np.float32]
     """Workspace, shape (2 joints,) [scaled]."""
 
@@ -167,6 +169,7 @@ class Player:
             np.ascontiguousarray(window.of_joints(scaling.observation_offset), np.float64),
             np.ascontiguousarray(window.of_joints(scaling.observation_scale), np.float64),
             np.ascontiguousarray(scaling.command_scale.reshape(joints, 2), np.float64),
+            stops_by_angle(window, scaling),
             np.zeros(2 * joints, np.float32),
         )
         both = joints, 2
@@ -316,6 +319,9 @@ def _push(mind: _Mind, watched: _Guard, velocity: Array, first: bool) -> None:
     if first:
         sigma[:] = 0
     else:
+        for j in range(velocity.size):
+            angle = np.float32((watched.angle[j] - mind.offset[j, 0]) / mind.scale[j, 0])
+            remember(layout, mind.by_angle, sigma, j, angle - sigma[angle_at(layout, 0, j)], np.float32(1.0))
         for j in range(velocity.size):
             for m in range(2):
                 valve = np.float64(watched.applied[j, m]) / mind.command_scale[j, m]

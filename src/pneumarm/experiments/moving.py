@@ -176,7 +176,7 @@ def from_visits(agent: Agent, angle: Array, pressure: Array) -> BeginStates:
     window = agent.window
     observed = np.concatenate([angle[..., None], np.zeros_like(angle)[..., None], pressure], axis=-1)
     newest = observed.reshape(len(angle), window.observation_size)
-    closed = np.zeros((len(angle), (window.history - 1) * window.command_size))
+    closed = np.zeros((len(angle), (window.history - 1) * window.command_size + window.memory_size))
     sigma = np.concatenate([np.tile(newest, window.history), closed], axis=1)
     order = np.argsort(angle[:, 0], kind="stable")
     states = scaled_state(sigma[order], window, agent.scaling)

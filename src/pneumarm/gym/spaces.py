@@ -109,7 +109,8 @@ def _state_bounds(window: Window, scaling: Scaling, ranges: ArrayLike) -> Array:
     offset, scale = scaling.observation_offset[:, None], scaling.observation_scale[:, None]
     observed = (np.asarray(ranges, np.float64) - offset) / scale
     commanded = np.array([[-1.0, 1.0]]) / scaling.command_scale[:, None]
-    return np.concatenate([observed] * window.history + [commanded] * (window.history - 1))
+    memory = np.tile([-1.0, 1.0], (window.memory_size, 1))
+    return np.concatenate([*[observed] * window.history, *[commanded] * (window.history - 1), memory])
 
 
 def _box(bounds: Array) -> Box:

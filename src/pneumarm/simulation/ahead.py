@@ -176,7 +176,7 @@ def _tape(simulation: Simulation, parameters: SimulationParameters, recorded: St
     tape = StretchTape(
         x=zeros(steps + 1, size),
         hidden=zeros(steps, units),
-        free=zeros(steps, outputs),
+        free=zeros(steps, outputs + parameters.stops.size),
         command=zeros(steps, commands),
         observed=zeros(steps, outputs),
         weight=np.ones((steps, outputs), np.float32),

@@ -61,8 +61,8 @@ class SimulationArm(Arm):
         observation[1 : window.joint_size : 4] = 0.0
         if not self.spec.pressure_sensors:
             window.of_joints(observation)[:, 2:] = 0.0
-        commands = np.zeros(window.state_size - window.history * window.observation_size)
-        sigma = np.concatenate([np.tile(observation, window.history), commands])
+        others = np.zeros(window.state_size - window.history * window.observation_size)
+        sigma = np.concatenate([np.tile(observation, window.history), others])
         begin(self._parameters, self._noise, self._state, scaled_state(sigma, window, simulation.scaling))
         quiet = noise_parameters(NoiseSettings(kind="none"), simulation)
         for _ in range(round(_SETTLE / self.spec.period)):

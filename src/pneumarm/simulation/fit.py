@@ -30,7 +30,7 @@ from pneumarm.networks import (
     two_layers,
 )
 from pneumarm.networks import importance as importance_of
-from pneumarm.settings import NonNegativeFloat, NonNegativeInt, PositiveInt, Settings, Valid
+from pneumarm.settings import NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveInt, Settings, Valid
 from pneumarm.simulation.ahead import fitted_ahead, stretches
 from pneumarm.simulation.history import LONGEST, SEEN, USUAL, chosen_history, columns
 from pneumarm.simulation.quality import Statistics, statistics
@@ -41,6 +41,7 @@ from pneumarm.transitions.collect import FEWEST_TRANSITIONS
 from pneumarm.transitions.filtering import Filtered, filter_transitions
 from pneumarm.transitions.goals import held_range, seen_goals
 from pneumarm.transitions.grid import GridSettings
+from pneumarm.transitions.hysteresis import RADII
 from pneumarm.transitions.rows import Rows
 from pneumarm.transitions.store import Store
 from pneumarm.transitions.window import QUANTITIES, Transitions, Window
@@ -86,6 +87,9 @@ class FitSettings(Settings):
     memory: PositiveInt | None = None
     """Observations in the state, for a policy to see; by default 8 or more where predictions are fitted ahead, for
     agents that settle, and else no more than the networks read (thesis)."""
+    hysteresis: tuple[PositiveFloat, ...] | None = None
+    """Radii of stop operators, by which the state remembers how a joint came to where it is [degrees]; by default 1
+    and 5 where predictions are fitted ahead, for agents that settle, and else none (thesis)."""
     approximator: Literal["network", "least-squares"] = "network"
     """Function approximator: a network (thesis), or a linear model by least squares."""
     layers: Literal[1, 2] | None = None
@@ -135,7 +139,12 @@ class FitSettings(Settings):
         """Return the settings with the history and memory that suit the arm of ``store`` where none is asked for."""
         history = self.history or min(chosen_history(store, store.spec, self.sensors), self._longest(store))
         settles = self.ahead > 0 and self.approximator == "network"
-        return replace(self, history=history, memory=self.memory or max(history, SEEN if settles else 1))
+        return replace(
+            self,
+            history=history,
+            memory=self.memory or max(history, SEEN if settles else 1),
+            hysteresis=(RADII if settles else ()) if self.hysteresis is None else self.hysteresis,
+        )
 
     def with_layers(self, joints: int, rows: int) -> "FitSettings":
         """Return the settings with what suits ``joints`` and ``rows`` where no layers or hidden units are chosen."""
@@ -436,7 +445,8 @@ def _unfitted(
 
 
 def _window(spec: ArmSpec, settings: FitSettings) -> Window:
-    return Window.of(spec, settings.observations, settings.sensors)
+    radii = tuple(one * spec.counts_per_degree for one in settings.hysteresis or ())
+    return Window.of(spec, settings.observations, settings.sensors, radii)
 
 
 def _commands(training: Transitions, window: Window) -> Commands:

@@ -32,7 +32,8 @@ class StepWorkspace(NamedTuple):
     change: NDArray[np.float32]
     """Predicted changes, shape (outputs, n)."""
     free: NDArray[np.float32]
-    """1 where a prediction was not cut off at the limits of its sensor, else 0, shape (outputs, n)."""
+    """1 where a prediction was not cut off at the limits of its sensor, and a stop operator not at its end, else 0;
+    shape (outputs + memory, n)."""
     slope: NDArray[np.float32]
     """Derivatives by what enters the hidden units, shape (units, n)."""
     second_slope: NDArray[np.float32]
@@ -42,7 +43,7 @@ class StepWorkspace(NamedTuple):
 def step_workspace(simulation: SimulationParameters, n: int) -> StepWorkspace:
     """Return workspace for steps of ``n`` states."""
     units, second, outputs = simulation.hidden.shape[1], simulation.second_bias.size, simulation.output_bias.size
-    sizes = units, second, outputs, outputs, units, second
+    sizes = units, second, outputs, outputs + simulation.stops.size, units, second
     return StepWorkspace(*(np.zeros((rows, n), np.float32) for rows in sizes))
 
 
@@ -87,7 +88,7 @@ def step_all(simulation, x, following, work):  # type: ignore[no-untyped-def]
     observed, commanded, command = layout.observed, layout.commanded, layout.command
     newest = layout.history * observed
     put(following[observed:newest], x[: newest - observed])
-    put(following[newest + commanded : command], x[newest : command - commanded])
+    put(following[newest + commanded : layout.memory], x[newest : layout.memory - commanded])
     if layout.history > 1:
         put(following[newest : newest + commanded], x[command : command + commanded])
     put(following[command:], x[command:])
@@ -103,6 +104,14 @@ def step_all(simulation, x, following, work):  # type: ignore[no-untyped-def]
         rate, rest = simulation.velocity[joint, 0], simulation.velocity[joint, 1]
         for e in range(n):
             following[velocity, e] = (following[angle, e] - x[angle, e]) * rate + rest
+    one, zero = np.float32(1.0), np.float32(0.0)
+    for i in range(simulation.stops.size):
+        joint, place, o = i // layout.remembered, layout.memory + i, work.change.shape[0] + i
+        angle, by_angle = angle_at(layout, 0, joint), simulation.stops[joint, i % layout.remembered]
+        for e in range(n):
+            followed = x[place, e] + by_angle * (following[angle, e] - x[angle, e])
+            work.free[o, e] = one if abs(followed) < one else zero
+            following[place, e] = min(max(followed, -one), one)
 
 
 @inner(fastmath=FASTMATH)
@@ -117,9 +126,17 @@ def step_back(simulation, later, sooner, work):  # type: ignore[no-untyped-def]
     newest = layout.history * observed
     sooner[:] = np.float32(0.0)
     put(sooner[: newest - observed], later[observed:newest])
-    put(sooner[newest : command - commanded], later[newest + commanded : command])
+    put(sooner[newest : layout.memory - commanded], later[newest + commanded : layout.memory])
     if layout.history > 1:
         put(sooner[command : command + commanded], later[newest : newest + commanded])
+    for i in range(simulation.stops.size):
+        joint, place, o = i // layout.remembered, layout.memory + i, work.change.shape[0] + i
+        angle, by_angle = angle_at(layout, 0, joint), simulation.stops[joint, i % layout.remembered]
+        for e in range(n):
+            by_stop = work.free[o, e] * later[place, e]
+            sooner[place, e] += by_stop
+            later[angle, e] += by_angle * by_stop
+            sooner[angle, e] -= by_angle * by_stop
     for joint in range(simulation.velocity.shape[0]):
         angle, velocity = angle_at(layout, 0, joint), velocity_at(layout, 0, joint)
         rate = simulation.velocity[joint, 0]

@@ -95,5 +95,5 @@ def columns(window: Window, history: int) -> NDArray[np.int64]:
     """Return the columns of a window's inputs that a window with a shorter ``history`` has."""
     observed, commanded = window.history * window.observation_size, window.command_size
     earlier = observed + np.arange((history - 1) * commanded)
-    now = window.input_size - commanded + np.arange(commanded)
+    now = window.input_size - commanded - window.memory_size + np.arange(window.memory_size + commanded)
     return np.concatenate([np.arange(history * window.observation_size), earlier, now])

@@ -50,6 +50,8 @@ class SimulationParameters(NamedTuple):
     """Highest prediction, shape (outputs,) [scaled]."""
     velocity: NDArray[np.float32]
     """Derived velocity by change of the angle, and at rest, shape (joints, 2) [scaled]; (0, 2) if predicted."""
+    stops: NDArray[np.float32]
+    """Change of each stop operator by that of its angle, both scaled, shape (joints, remembered)."""
     layout: Layout
 
 
@@ -115,6 +117,7 @@ def simulation_parameters(simulation: Simulation) -> SimulationParameters:
         lowest=_float32(lowest[simulation.outputs]),
         highest=_float32(highest[simulation.outputs]),
         velocity=_float32(velocity if simulation.velocity == "derived" else velocity[:0]),
+        stops=stops_by_angle(window, scaling),
         layout=layout,
     )
 
@@ -197,10 +200,28 @@ def shift(layout, x, command):  # type: ignore[no-untyped-def]
     for i in range(newest - 1, layout.observed - 1, -1):
         x[i] = x[i - layout.observed]
     if layout.history > 1:
-        for i in range(layout.command - 1, newest + layout.commanded - 1, -1):
+        for i in range(layout.memory - 1, newest + layout.commanded - 1, -1):
             x[i] = x[i - layout.commanded]
         for i in range(layout.commanded):
             x[newest + i] = command[i]
+
+
+@part(entry=True)
+def remember(layout, by_angle, x, joint, moved, most):  # type: ignore[no-untyped-def]
+    """Let the stop operators of ``joint`` in ``x`` follow an angle that has ``moved``, up to ``most`` either way.
+
+    All is scaled: ``by_angle`` (joints, remembered) is the change of operators, whose ends are -1 and 1, by the
+    angle's.
+    """
+    for i in range(layout.remembered):
+        place = layout.memory + joint * layout.remembered + i
+        x[place] = min(max(x[place] + by_angle[joint, i] * moved, -most), most)
+
+
+def stops_by_angle(window: Window, scaling: Scaling) -> NDArray[np.float32]:
+    """Return the change of stop operators by that of their angle, both scaled, shape (joints, remembered)."""
+    scale = window.of_joints(scaling.observation_scale)[:, :1]
+    return _float32(scale / np.array(window.hysteresis, np.float64))
 
 
 @part
@@ -208,6 +229,8 @@ def push(simulation, x, change, command):  # type: ignore[no-untyped-def]
     """Shift the window in ``x`` by one step: add ``change`` to the newest observation, remember ``command``."""
     layout = simulation.layout
     shift(layout, x, command)
+    for joint in range(layout.joints):
+        remember(layout, simulation.stops, x, joint, -x[angle_at(layout, 0, joint)], np.float32(np.inf))
     for joint in range(simulation.velocity.shape[0]):
         x[velocity_at(layout, 0, joint)] = x[angle_at(layout, 0, joint)]
     for o in range(change.shape[0]):
@@ -217,6 +240,8 @@ def push(simulation, x, change, command):  # type: ignore[no-untyped-def]
         velocity = velocity_at(layout, 0, joint)
         moved = x[angle_at(layout, 0, joint)] - x[velocity]
         x[velocity] = moved * simulation.velocity[joint, 0] + simulation.velocity[joint, 1]
+    for joint in range(layout.joints):
+        remember(layout, simulation.stops, x, joint, x[angle_at(layout, 0, joint)], np.float32(1.0))
 
 
 @part

@@ -2,7 +2,7 @@
 
 Everything that reads the state reads one vector ``x`` of scaled numbers, padded to a multiple of four:
 
-    x = (o_k, ..., o_{k-h+1}, a_{k-1}, ..., a_{k-h+1}, a_k, goal, 1, 0, ...)
+    x = (o_k, ..., o_{k-h+1}, a_{k-1}, ..., a_{k-h+1}, stops, a_k, goal, 1, 0, ...)
 
 with observations and commands as in :mod:`pneumarm.transitions.window`; the 1 carries the biases of networks.
 """
@@ -27,6 +27,10 @@ class Layout(NamedTuple):
     """Numbers in an observation."""
     commanded: int
     """Numbers in a command."""
+    memory: int
+    """Place of the stop operators of the first joint, those of the next following on them."""
+    remembered: int
+    """Stop operators of each joint."""
     command: int
     """Place of the command that is given now; what lies before it is the state window sigma."""
     goal: int
@@ -61,6 +65,8 @@ def layout_of(window: Window) -> Layout:
         history=window.history,
         observed=window.observation_size,
         commanded=commanded,
+        memory=command - window.memory_size,
+        remembered=len(window.hysteresis),
         command=command,
         goal=command + commanded,
         one=one,

@@ -255,12 +255,13 @@ def advanced(inputs: Floats, observation: Floats, command: ArrayLike, window: Wi
     """Return the inputs (n, input_size) a step later, with a new ``observation`` and the next ``command``."""
     size, past = window.observation_size, window.history * window.observation_size
     kept = inputs[:, : past - size]
-    commands = inputs[:, past : window.state_size]
+    commands = inputs[:, past : window.state_size - window.memory_size]
     last = inputs[:, window.state_size :]
+    memory = window.remembered(inputs, observation)
     if window.history == 1:
-        return np.concatenate([observation, command], axis=1)
+        return np.concatenate([observation, memory, command], axis=1)
     older = commands[:, : -window.command_size]
-    return np.concatenate([observation, kept, last, older, command], axis=1)
+    return np.concatenate([observation, kept, last, older, memory, command], axis=1)
 
 
 class Propagation(NamedTuple):

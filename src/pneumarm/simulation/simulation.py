@@ -60,9 +60,10 @@ class Scaling:
     def inputs(self, raw: ArrayLike, window: Window) -> NDArray[np.float64]:
         """Return the scaled inputs (n, input_size), or states (n, state_size), of ``raw`` ones in sensor units."""
         raw = np.asarray(raw, np.float64)
-        commands = (raw.shape[-1] - window.history * window.observation_size) // window.command_size
+        radii = np.tile(np.array(window.hysteresis, np.float64), window.joints)
         offset = np.tile(self.observation_offset, window.history)
-        scale = [*[self.observation_scale] * window.history, *[self.command_scale] * commands]
+        scale = [*[self.observation_scale] * window.history, *[self.command_scale] * (window.history - 1), radii]
+        scale += [self.command_scale] if raw.shape[-1] > window.state_size else []
         scaled: NDArray[np.float64] = raw / np.concatenate(scale)
         scaled[..., : len(offset)] -= offset / np.tile(self.observation_scale, window.history)
         return scaled

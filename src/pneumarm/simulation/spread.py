@@ -24,14 +24,14 @@ def spread_over_periods(simulation: Simulation, recorded: Transitions, seed: int
     were recorded, in sensor units as these; pulses are shares of the control period, -1 to 1.
     """
     window, random = simulation.window, np.random.default_rng([seed, _STREAM])
-    first = window.input_size - window.history * window.command_size  # past commands and the newest
+    commanded = window.commanded
     inputs = recorded.inputs.astype(np.float64)
-    whole = inputs[:, first:]
+    whole = inputs[:, commanded]
     kept = (random.random(whole.shape) < _AS_THEY_ARE) | ~whole.any(axis=0)  # a muscle that is not there has none
     pulses = np.where(kept, whole, random.uniform(-1.0, 1.0, whole.shape))
     following = np.zeros(recorded.target.shape)
     for _ in range(_DRAWS):
-        inputs[:, first:] = np.sign(pulses) * (random.random(pulses.shape) < np.abs(pulses))
+        inputs[:, commanded] = np.sign(pulses) * (random.random(pulses.shape) < np.abs(pulses))
         following += simulation.predict(inputs) / _DRAWS
-    inputs[:, first:] = pulses
+    inputs[:, commanded] = pulses
     return recorded._replace(inputs=inputs.astype(np.float32), target=following.astype(np.float32))

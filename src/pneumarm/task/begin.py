@@ -14,7 +14,7 @@ from pneumarm.random import integer, uniform
 from pneumarm.simulation.kernel import scaled_state
 from pneumarm.simulation.simulation import Scaling
 from pneumarm.transitions.rows import Rows
-from pneumarm.transitions.window import Window, observations
+from pneumarm.transitions.window import Window, memories, observations
 
 _STILL = 2.0  # counts of the thesis' sensors; readings of an arm at rest differ by so much
 _LEAST = 1.0  # count of any sensor, as which noise is seen where counts are coarse
@@ -62,7 +62,8 @@ def _resting(rows: Rows, window: Window, spec: ArmSpec) -> NDArray[np.float64]:
     """Return the windows (m, state_size) of the resting states in one block, in sensor units."""
     h, observed = window.history, observations(rows, window)
     began = np.flatnonzero(rows.at_rest & (rows.step == 0))
-    parts = [_window([observed[began]] * h, window)]
+    memory = memories(rows, window)
+    parts = [_window([observed[began]] * h, memory[began], window)]
     if len(rows) > h:
         k = np.arange(h, len(rows))
         lags = k[:, None] - np.arange(h + 1)  # the oldest velocity needs one row more
@@ -75,13 +76,15 @@ def _resting(rows: Rows, window: Window, spec: ArmSpec) -> NDArray[np.float64]:
         ):
             still &= (np.ptp(values[lags], axis=1) <= max(_STILL * unit, _LEAST)).all(axis=1)
         k = k[joined & closed & still]
-        parts.append(_window([observed[k - lag] for lag in range(h)], window))
+        parts.append(_window([observed[k - lag] for lag in range(h)], memory[k], window))
     return np.concatenate(parts)
 
 
-def _window(newest_first: list[NDArray[np.float64]], window: Window) -> NDArray[np.float64]:
-    closed = np.zeros((len(newest_first[0]), (window.history - 1) * window.command_size))
-    return np.concatenate([*newest_first, closed], axis=1)
+def _window(
+    newest_first: list[NDArray[np.float64]], memory: NDArray[np.float64], window: Window
+) -> NDArray[np.float64]:
+    closed = np.zeros((len(memory), (window.history - 1) * window.command_size))
+    return np.concatenate([*newest_first, closed, memory], axis=1)
 
 
 class BeginParameters(NamedTuple):

@@ -7,10 +7,32 @@ from numpy.typing import ArrayLike, NDArray
 
 from pneumarm.arm.seam import Reading, measured
 from pneumarm.arm.velocity import derived_velocity
-from pneumarm.simulation.kernel import shift
-from pneumarm.simulation.layout import layout_of
+from pneumarm.kernels import kernel
+from pneumarm.simulation.kernel import remember, shift, stops_by_angle
+from pneumarm.simulation.layout import angle_at, layout_of
 from pneumarm.simulation.simulation import Scaling
 from pneumarm.transitions.window import QUANTITIES, Window
+
+
+@kernel
+def write_observation(layout, scale, by_angle, observation, first, command, state):  # type: ignore[no-untyped-def]
+    """Put the newest ``observation`` [counts] into the window at the begin of ``state``, the scaled ``command`` too.
+
+    ``scale`` holds the offsets and scales of observations, ``by_angle`` (joints, remembered) the change of stop
+    operators by that of their angle. The ``first`` observation of an episode fills the whole window.
+    """
+    if not first:
+        for joint in range(layout.joints):
+            angle = angle_at(layout, 0, joint)
+            moved = np.float32((observation[angle] - scale[0, angle]) / scale[1, angle]) - state[angle]
+            remember(layout, by_angle, state, joint, moved, np.float32(1.0))
+        shift(layout, state, command)
+    for i in range(layout.observed):
+        newest = np.float32((observation[i] - scale[0, i]) / scale[1, i])
+        state[i] = newest
+        if first:
+            for lag in range(1, layout.history):
+                state[lag * layout.observed + i] = newest
 
 
 class StateTracker:
@@ -23,10 +45,11 @@ class StateTracker:
 
     def __init__(self, window: Window, scaling: Scaling) -> None:
         self.window = window
-        self._offset, self._scale = scaling.observation_offset, scaling.observation_scale
+        self._scale = np.stack([scaling.observation_offset, scaling.observation_scale])
         self._layout = layout_of(window)
         self._measures = window.velocity == "measured"
         self._command_scale = scaling.command_scale
+        self._by_angle = stops_by_angle(window, scaling)
         self.reset()
 
     def reset(self) -> None:
@@ -61,12 +84,7 @@ class StateTracker:
         joints[:, 2:] = np.asarray(pressure, np.float64).reshape(window.joints, 2)
         if window.further:
             observation[window.joint_size :] = measured[-len(window.further) :]
-        newest = (observation - self._offset) / self._scale
-        if first:
-            state[: window.history * observed] = np.tile(newest, window.history)
-        else:
-            shift(self._layout, state, self._command)  # ten times as fast as in plain Python
-            state[:observed] = newest
+        write_observation(self._layout, self._scale, self._by_angle, observation, first, self._command, state)
         return state.copy()
 
     def reading(self, reading: Reading) -> NDArray[np.float32]:

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from pneumarm.arm.seam import ArmSpec, SensorKind, velocity_name
 from pneumarm.arm.velocity import derived_velocity
 from pneumarm.errors import UnusableInput
+from pneumarm.transitions.hysteresis import stops_of
 from pneumarm.transitions.rows import Rows
 
 QUANTITIES = ("angle", "velocity", "pressure_1", "pressure_2")
@@ -38,9 +39,13 @@ class Window:
     """Whether the velocity is derived from the angle (thesis section 2.3.4), or that of a sensor (section 7.3)."""
     further: tuple[str, ...] = ()
     """Names of further sensors whose readings an observation ends in, as in :attr:`~pneumarm.arm.ArmSpec.further`."""
+    hysteresis: tuple[float, ...] = ()
+    """Radii of the stop operators of each joint (:mod:`.hysteresis`) [counts]; the state ends in where these are."""
 
     @classmethod
-    def of(cls, spec: ArmSpec, history: int, kinds: Iterable[SensorKind] = ()) -> "Window":
+    def of(
+        cls, spec: ArmSpec, history: int, kinds: Iterable[SensorKind] = (), hysteresis: tuple[float, ...] = ()
+    ) -> "Window":
         """Return the window of an arm ``spec`` with all its further sensors of these ``kinds``.
 
         Raises:
@@ -55,7 +60,7 @@ class Window:
                 f"{', '.join(sorted(offered)) or 'no further ones'}"
             )
         further = tuple(one.name for one in spec.sensors if one.kind in wanted)
-        return cls(spec.joints, history, "measured" if "velocity" in wanted else "derived", further)
+        return cls(spec.joints, history, "measured" if "velocity" in wanted else "derived", further, hysteresis)
 
     @cached_property
     def needs(self) -> tuple[str, ...]:
@@ -99,12 +104,34 @@ class Window:
     @property
     def state_size(self) -> int:
         """Numbers in sigma."""
-        return self.history * self.observation_size + (self.history - 1) * self.command_size
+        return self.history * self.observation_size + (self.history - 1) * self.command_size + self.memory_size
+
+    @property
+    def memory_size(self) -> int:
+        """Numbers at the end of sigma that tell of the movements before it."""
+        return len(self.hysteresis) * self.joints
 
     @property
     def input_size(self) -> int:
         """Numbers in sigma and the action: the input of the simulation's networks."""
         return self.state_size + self.command_size
+
+    @property
+    def commanded(self) -> NDArray[np.int64]:
+        """Places of the commands in an input, past ones and the newest."""
+        past = np.arange(self.history * self.observation_size, self.state_size - self.memory_size)
+        return np.concatenate([past, np.arange(self.state_size, self.input_size)])
+
+    def remembered(self, inputs: NDArray[Any], observation: NDArray[Any]) -> NDArray[Any]:
+        """Return where stop operators are (n, memory_size) once ``observation`` (n, observation_size) is made.
+
+        ``inputs`` (n, at least state_size) are states before it, both in sensor units.
+        """
+        moved = (self.of_joints(observation) - self.of_joints(inputs[:, : self.observation_size]))[..., 0]
+        before = inputs[:, self.state_size - self.memory_size : self.state_size]
+        radii = np.tile(np.array(self.hysteresis, np.float64), self.joints)
+        followed = before + np.repeat(moved, len(self.hysteresis), axis=1)
+        return np.clip(followed, -radii, radii)
 
     def input_names(self) -> list[str]:
         """Return a name for each input, such as ``angle[k-1]``; with more joints ``angle of joint 2[k-1]``."""
@@ -123,6 +150,7 @@ class Window:
 
         names = [name for lag in range(self.history) for name in observed(lag)]
         names += [name for lag in range(1, self.history) for name in named(commands, lag)]
+        names += named(tuple(f"stop_{i + 1}" for i in range(len(self.hysteresis))), 0)
         return names + named(commands, 0)
 
 
@@ -200,7 +228,7 @@ def transitions(rows: Rows, window: Window) -> Transitions:
     for lag in range(1, window.history):
         inside = (position[k] >= lag)[:, None]
         parts.append(np.where(inside, command[np.maximum(k - lag, 0)], 0.0))
-    parts.append(command[k])
+    parts += [memories(rows, window)[k], command[k]]
     return Transitions(
         inputs=np.concatenate(parts, axis=1, dtype=np.float32),
         target=observed[k + 1].astype(np.float32),
@@ -209,6 +237,15 @@ def transitions(rows: Rows, window: Window) -> Transitions:
         interval=(rows.time[k + 1] - rows.time[k]).astype(np.float32),
         time=rows.time[k],
     )
+
+
+def memories(rows: Rows, window: Window) -> NDArray[np.float64]:
+    """Return where the stop operators of the joints are in all rows, shape (n, memory_size) [counts].
+
+    They begin at 0 with every sequence, and after a gap.
+    """
+    first = np.maximum.accumulate(np.where(_follows(rows), 0, np.arange(len(rows))))
+    return stops_of(rows.angle, first, np.array(window.hysteresis, np.float64))
 
 
 def _follows(rows: Rows) -> NDArray[np.bool_]:

@@ -15,8 +15,8 @@ LONGEST = 120.0
 """avrdude is ended after this time [s]; it takes five."""
 
 
-def flash(port: str) -> int:
-    """Flash the board at ``port``; return the speed of its boot loader [symbols/s].
+def flash(port: str, program: Path = FIRMWARE) -> int:
+    """Flash the board at ``port`` with a ``program``; return the speed of its boot loader [symbols/s].
 
     Raises:
         UnusableInput: there is no such port, or no avrdude on this computer.
@@ -36,7 +36,7 @@ def flash(port: str) -> int:
         command = [avrdude, "-p", "atmega328p", "-c", "arduino", "-P", port, "-b", str(baud), "-D"]
         try:
             done = subprocess.run(
-                [*command, "-U", f"flash:w:{FIRMWARE}:i"], capture_output=True, text=True, timeout=LONGEST
+                [*command, "-U", f"flash:w:{program}:i"], capture_output=True, text=True, timeout=LONGEST
             )
         except subprocess.TimeoutExpired as error:
             raise ArmFailure(

@@ -165,9 +165,11 @@ class Memory(NamedTuple):
     lasting: NDArray[np.float64]
     """Residuals of angle and pressures: how many, mean square, mean product of one with the one before, the last one;
     shape (joints, 3, 4)."""
+    stops: NDArray[np.float64]
+    """Where the stop operators are that a simulation reads, shape (joints remembered,) [scaled]."""
 
 
-def new_memory(joints: int, history: int, hypotheses: int) -> Memory:
+def new_memory(joints: int, history: int, hypotheses: int, stops: int = 0) -> Memory:
     """Return an empty memory; ``history`` is at least 2."""
     return Memory(
         observed=np.zeros((history, joints, 4)),
@@ -194,6 +196,7 @@ def new_memory(joints: int, history: int, hypotheses: int) -> Memory:
         trust=np.ones(2 * joints),
         angle=np.zeros(joints),
         lasting=np.tile([_AT_FIRST, 1.0, 0.0, 0.0], (joints, 3, 1)),
+        stops=np.zeros(stops),
     )
 
 

@@ -12,6 +12,7 @@ from pneumarm.simulation.kernel import (
     SimulationParameters,
     SimulationState,
     predict_change,
+    remember,
     simulation_parameters,
     simulation_state,
 )
@@ -111,6 +112,13 @@ def expect_by_simulation(predictor, readings, memory):  # type: ignore[no-untype
                 scaled = (memory.observed[lag, j, q] - predictor.offset[j, q]) / predictor.scale[j, q]
                 x[reading_at(layout, lag, j, q)] = np.float32(scaled)
         expect_further(predictor, lag)
+    for i in range(memory.stops.shape[0]):
+        x[layout.memory + i] = memory.stops[i]
+    for j in range(layout.joints):
+        moved = np.float32((memory.observed[0, j, 0] - memory.observed[1, j, 0]) / predictor.scale[j, 0])
+        remember(layout, predictor.simulation.stops, x, j, moved, np.float32(1.0))
+    for i in range(memory.stops.shape[0]):
+        memory.stops[i] = x[layout.memory + i]
     for h in range(memory.expected.shape[0]):
         expected, doubt = memory.expected[h], memory.doubt[h]
         if readings.leak[h].any():

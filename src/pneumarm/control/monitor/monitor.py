@@ -89,7 +89,8 @@ class Monitor:
         if not spec.pressure_sensors:  # estimates follow the commands, whatever valves and air do
             self._hypotheses, self._readings = self._hypotheses[:1], self._readings.first(1)
         history = 2 if simulation is None else max(2, simulation.window.history)
-        self._memory = new_memory(spec.joints, history, len(self._hypotheses))
+        stops = 0 if simulation is None else simulation.window.memory_size
+        self._memory = new_memory(spec.joints, history, len(self._hypotheses), stops)
         self._simulation = simulation
         self._known = identified(spec)
         self._predictor = None if simulation is None else predictor(simulation)

@@ -2,66 +2,86 @@
 
 from importlib import resources
 
-import numpy as np
-from numpy.typing import ArrayLike
-
 from pneumarm.learning.servo.agent import ServoAgent
-from pneumarm.learning.servo.commands import WHOLE
-from pneumarm.learning.servo.inputs import input_size
+from pneumarm.learning.servo.board import (
+    BoardController,
+    act_board,
+    ask_board,
+    begin_board,
+    see_board,
+)
+from pneumarm.learning.servo.networks import run_network
+from pneumarm.learning.servo.quantised import Quantised, run_quantised
+from pneumarm.learning.servo.translate import Array, Kept, Known, Translator
 
-_PLACE = "/* PARAMETERS */"
-_A_LINE = 6
-"""Numbers in a line of the file."""
+_HELPERS = {
+    "min_{name}": "{{\n\treturn a < b ? a : b;\n}}",
+    "max_{name}": "{{\n\treturn a > b ? a : b;\n}}",
+    "abs_{name}": "{{\n\treturn a < 0 ? -a : a;\n}}",
+    "floor_{name}": "{{\n\tint whole = (int)a;\n\treturn ({kind})(whole > a ? whole - 1 : whole);\n}}",
+    "round_{name}": "{{ /* half to even, as IEEE 754 and Python do */\n\tint whole = (int)(a + ({kind})0.5);\n"
+    "\treturn ({kind})(whole % 2 && ({kind})whole - a == ({kind})0.5 ? whole - 1 : whole);\n}}",
+}
+"""What Python has built in, of numbers that are not negative where they are rounded to whole ones."""
+_KINDS = {"int": "int", "int32": "int32_t", "float": "float", "real": "real"}
 
 
-def as_c(agent: ServoAgent) -> str:
-    """Return the policy of ``agent`` with its scaling as C: ``servo_act`` and all that it needs."""
-    window, scaling, task = agent.window, agent.scaling, agent.task
-    seen, made, sizes = task.inputs, task.commands, agent.sizes
+def as_c(agent: ServoAgent, quantised: Quantised | None = None) -> str:
+    """Return all that acts of ``agent`` as C: ``servo_act`` and what it needs, ``quantised`` or in floats."""
+    controller, whole, spec = BoardController(agent, quantised), Translator(), agent.spec
+    joints, path = spec.joints, (controller.path_length, spec.joints)
+    servo, board = Known(controller.parameters, "servo"), Kept(controller.state, "board")
+    angle, pressure, wanted = (Array("float64", shape) for shape in ((joints,), (joints, 2), path))
+    run = run_network if quantised is None else run_quantised
+    network, units = Known(controller.network, "network"), Kept(controller.units, "units")
+    whole.function(begin_board, servo, board)
+    whole.function(ask_board, servo, board)
+    whole.function(see_board, servo, board, angle, pressure, wanted, "bool")
+    whole.function(run, network, _field(board, "inputs"), units, _field(board, "said"))
+    whole.function(act_board, servo, board, pressure, pressure)
+    written = whole.text()
+    if quantised is not None:
+        written = _with_products_by_hand(written)
     numbers = {
-        "JOINTS": window.joints,
-        "HISTORY": window.history,
-        "OBSERVED": window.observation_size,
-        "STATE": window.state_size,
-        "PREVIEWS": len(seen.steps),
-        "LAYERS": len(sizes) - 1,
-        "WIDEST": max(input_size(seen), *sizes),
+        "JOINTS": joints,
+        "PATH": path[0],
+        "PERIOD": spec.period,
+        "COUNTS_PER_DEGREE": spec.counts_per_degree,
+        "MIDDLE": sum(spec.angle_range) / 2,
+        "LOWEST": float(agent.goal_range[0, 0]),
+        "HIGHEST": float(agent.goal_range[0, 1]),
+        "MOST_PRESSURE": spec.max_pressure_counts,
+        "COUNTS_PER_BAR": spec.counts_per_bar,
+        "MOST_INFLATION": spec.max_inflation,
     }
-    whole = min(float(WHOLE), 1 - made.shortest / 2)
-    shares = {"DEAD": made.dead, "SHORTEST": made.shortest, "STEP": made.step, "WHOLE": whole}
-    lines = [
-        f"/* For {_safe(agent.spec.name)}, {1 / agent.spec.period:g} Hz, {agent.spec.counts_per_degree:g} counts per "
-        f"degree, {agent.spec.counts_per_bar:g} counts per bar. */",
-        *(f"#define SERVO_{name} {value}" for name, value in numbers.items()),
-        *(f"#define SERVO_{name} {_float(value)}" for name, value in shares.items()),
-        f"const int servo_ahead[SERVO_PREVIEWS] = {{{', '.join(str(step) for step in seen.steps)}}};",
-        f"static const int servo_sizes[SERVO_LAYERS + 1] = {{{', '.join(map(str, sizes))}}};",
-        _array("servo_offset[SERVO_OBSERVED]", scaling.observation_offset),
-        _array("servo_scales[SERVO_OBSERVED]", scaling.observation_scale),
-        _array("servo_command_scale[2 * SERVO_JOINTS]", scaling.command_scale),
-        _array("servo_rate[SERVO_JOINTS]", seen.rate),
-        _array("servo_tolerances[SERVO_JOINTS]", seen.tolerances),
-        f"static const float servo_inlet[SERVO_JOINTS][2] = {{{', '.join(_braced(row) for row in made.inlet)}}};",
-        _array(f"servo_weights[{agent.policy.size}]", agent.policy),
+    parts = [
+        f"/* For {_safe(spec.name)}, {1 / spec.period:g} Hz, {spec.counts_per_degree:g} counts per degree, "
+        f"{spec.counts_per_bar:g} counts per bar. */",
+        *(f"#define SERVO_{name} {value!r}" for name, value in numbers.items()),
+        *(_helper(name, body, kind) for name, body in _HELPERS.items() for kind in _KINDS),
     ]
+    parts = [one for one in parts if not one.startswith("static") or f"{one.split('(')[0].split()[-1]}(" in written]
     template = resources.files("pneumarm.learning.servo").joinpath("servo.c").read_text(encoding="utf-8")
-    return template.replace(_PLACE, "\n".join(lines))
+    text = template.replace("/* PARAMETERS */", "\n".join([*parts, written]))
+    return text.replace("/* NETWORK */", run.__name__)
 
 
-def _array(name: str, values: ArrayLike) -> str:
-    numbers = [_float(value) for value in np.asarray(values, np.float32).ravel().tolist()]
-    rows = [", ".join(numbers[i : i + _A_LINE]) for i in range(0, len(numbers), _A_LINE)]
-    return f"static const float {name} = {{\n    " + ",\n    ".join(rows) + "};"
+def _with_products_by_hand(written: str) -> str:
+    """Return it with the sums of products that the AVR's compiler makes slow ones of."""
+    by_hand = resources.files("pneumarm.learning.servo").joinpath("products.c").read_text(encoding="utf-8")
+    begin = written.index("/* Return the sum of count products")
+    end = written.index("/*", written.rindex("/* Return the sum of count products") + 2)
+    return f"{written[:begin]}{by_hand}#else\n{written[begin:end].rstrip()}\n#endif\n\n{written[end:]}"
 
 
-def _braced(values: ArrayLike) -> str:
-    return f"{{{', '.join(_float(value) for value in np.asarray(values, np.float32).tolist())}}}"
+def _field(of: Kept, name: str) -> Kept:
+    return Kept(getattr(of.value, name), f"{of.name}_{name}")
 
 
-def _float(value: float) -> str:
-    """Return a number of single precision as C writes it, with all its digits."""
-    text = np.format_float_scientific(np.float32(value), unique=True, trim="0")
-    return f"{text}f"
+def _helper(name: str, body: str, short: str) -> str:
+    kind, takes = _KINDS[short], "a, {kind} b" if "return a < b" in body or "return a > b" in body else "a"
+    head = f"static {kind} {name.format(name=short)}({kind} {takes.format(kind=kind)})"
+    return f"{head}\n" + body.format(kind=kind)
 
 
 def _safe(name: str) -> str:

@@ -10,8 +10,12 @@ r is: what the joint lags behind, falls short or goes beyond is put right in tim
 it is friction, hysteresis or a bias of the simulation. For a constant r it is integral action.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
+
+from pneumarm.kernels import inner, kernel
 
 Array = NDArray[np.float64]
 
@@ -20,6 +24,68 @@ _SLOW = np.array([0.0, 1.0, 0.05])  # features below so many allowed errors, in 
 _FORGOTTEN = 0.8  # share of the weights that is left after an error that teaches nothing
 _STEP = 0.06  # mu: a third of a second to learn, and slower than the joint answers
 _KEPT = 0.99  # of the largest square of a feature, from step to step
+
+
+class CorrectionParameters(NamedTuple):
+    """How corrections are learned. Made by :func:`correction_parameters`."""
+
+    taught_by: float
+    """Largest error that teaches [counts]."""
+    least: Array
+    """Smallest square of each feature that counts, shape (3,)."""
+    step: float
+    kept: float
+    forgotten: float
+
+
+def correction_parameters(taught_by: float) -> CorrectionParameters:
+    """Return how corrections are learned from errors of at most ``taught_by`` [counts]."""
+    return CorrectionParameters(taught_by, (taught_by * _SLOW) ** 2, _STEP, _KEPT, _FORGOTTEN)
+
+
+@kernel
+def learn_correction(parameters, weights, largest, error, features):  # type: ignore[no-untyped-def]
+    """Learn ``weights`` from the ``error`` (joints,) and ``features`` of the same time; all else is (joints, 3)."""
+    for j in range(error.shape[0]):
+        for i in range(FEATURES):
+            feature = features[j, i]
+            largest[j, i] = max(parameters.kept * largest[j, i], feature * feature)
+            if abs(error[j]) <= parameters.taught_by:
+                weights[j, i] += parameters.step * error[j] * feature / max(largest[j, i], parameters.least[i])
+            else:
+                weights[j, i] = parameters.forgotten * weights[j, i]
+
+
+@inner
+def correction_of(parameters, weights, features, j):  # type: ignore[no-untyped-def]
+    """Return the correction of joint ``j`` [counts] at a time with these ``features`` (joints, 3)."""
+    total = 0.0
+    for i in range(FEATURES):
+        total += weights[j, i] * features[j, i]
+    most = 2.0 * parameters.taught_by
+    return min(max(total, -most), most)
+
+
+@inner
+def write_features(path, step, middle, features):  # type: ignore[no-untyped-def]
+    """Set the ``features`` (joints, 3) at a ``step`` of a ``path`` (n, joints) that begins a step earlier."""
+    for j in range(features.shape[0]):
+        features[j, 0] = 1.0
+        features[j, 1] = path[step + 1, j] - middle[j]
+        features[j, 2] = (path[step + 2, j] - path[step, j]) / 2.0
+
+
+@kernel
+def _write_all_features(path, middle, features):  # type: ignore[no-untyped-def]
+    for step in range(features.shape[0]):
+        write_features(path, step, middle, features[step])
+
+
+@kernel
+def _correct(parameters, weights, features, corrections):  # type: ignore[no-untyped-def]
+    for step in range(features.shape[0]):
+        for j in range(features.shape[1]):
+            corrections[step, j] = correction_of(parameters, weights, features[step], j)
 
 
 class Correction:
@@ -31,16 +97,12 @@ class Correction:
 
     def __init__(self, joints: int, taught_by: float) -> None:
         self._weights = np.zeros((joints, FEATURES))
-        self._taught_by = taught_by
-        self._least = (taught_by * _SLOW) ** 2
         self._largest = np.zeros((joints, FEATURES))
+        self._parameters = correction_parameters(taught_by)
 
     def learn(self, error: Array, features: Array) -> None:
         """Learn from the ``error`` (joints,) [counts] and the ``features`` (joints, 3) of the same time."""
-        self._largest = np.maximum(_KEPT * self._largest, features**2)
-        taught = np.abs(error) <= self._taught_by
-        change = _STEP * error[:, None] * features / np.maximum(self._largest, self._least)
-        self._weights = np.where(taught[:, None], self._weights + change, _FORGOTTEN * self._weights)
+        learn_correction(self._parameters, self._weights, self._largest, error, features)
 
     def forget(self) -> None:
         """Forget what was learned."""
@@ -48,10 +110,13 @@ class Correction:
 
     def of(self, features: Array) -> Array:
         """Return the corrections (n, joints) [counts] at times with the ``features`` (n, joints, 3)."""
-        return np.clip((self._weights * features).sum(axis=-1), -2 * self._taught_by, 2 * self._taught_by)
+        corrections = np.empty(features.shape[:2])
+        _correct(self._parameters, self._weights, features, corrections)
+        return corrections
 
 
 def features_of(path: Array, middle: Array) -> Array:
     """Return the features (n, joints, 3) of a reference with a ``path`` (n + 2, joints) from a step earlier."""
-    slope = (path[2:] - path[:-2]) / 2
-    return np.stack([np.ones_like(slope), path[1:-1] - middle, slope], axis=-1)
+    features = np.empty((len(path) - 2, path.shape[1], FEATURES))
+    _write_all_features(path, middle, features)
+    return features

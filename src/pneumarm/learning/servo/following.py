@@ -11,7 +11,7 @@ from pneumarm.learning.servo.two_ways import TwoWays
 from pneumarm.task.acting import LATE
 from pneumarm.task.forecast import Forecast
 
-_TAUGHT_BY = 2.0  # most tolerances of an error that corrections are learned from
+TAUGHT_BY = 2.0  # most tolerances of an error that corrections are learned from
 _HOPED, _LEARNED = 0.5, 0.7  # tolerances that plans are hoped to be off by; see TwoWays
 _GAINED = 0.12  # tolerances nearer by a plan than by the policy, in the simulation, for plans to be tried first ...
 _ASKED = 0.0, 0.167, 0.333  # s after a reference began to move, at which the simulation is asked that
@@ -28,7 +28,7 @@ class Following:
         self._unit = agent.settings.tolerance * agent.spec.counts_per_degree
         self._forecast = Forecast(agent.spec.period)
         self._before: NDArray[np.float64] | None = None
-        self._correction = Correction(agent.spec.joints, _TAUGHT_BY * tolerance)
+        self._correction = Correction(agent.spec.joints, TAUGHT_BY * tolerance)
         self._ways = TwoWays(agent.spec.period, _HOPED, learned=_LEARNED)
         self._asked = [1 + round(after / agent.spec.period) for after in _ASKED]
         self._moved = 0  # turns in which the reference has moved

@@ -105,7 +105,7 @@ def tape(task: ServoTask, steps: int, n: int, hidden: int = 0) -> Tape:
     return Tape(
         x=zeros(steps + 1, size),
         hidden=zeros(steps, units),
-        free=zeros(steps, outputs),
+        free=zeros(steps, outputs + simulation.stops.size),
         inputs=zeros(steps, inputs),
         units=zeros(steps, hidden),
         slope=zeros(steps, 2 * joints),
@@ -147,7 +147,8 @@ def move_forward(task, net, tape):  # type: ignore[no-untyped-def]
 def note_free(task, tape, t):  # type: ignore[no-untyped-def]
     """Note what share of the gradient passes at step ``t``."""
     least, free = np.float32(task.past_the_limit), tape.work.free
-    for o in range(free.shape[0]):
+    put(tape.free[t], free)
+    for o in range(tape.work.change.shape[0]):
         for e in range(free.shape[1]):
             tape.free[t, o, e] = max(free[o, e], least)
 

@@ -51,8 +51,8 @@ def seen_parameters(simulation: Simulation, preview: tuple[float, ...], toleranc
 
 def input_size(parameters: SeenParameters) -> int:
     """Return how many inputs there are."""
-    joints, history = parameters.rate.size, parameters.layout.history
-    return joints * (1 + (history - 1) + 4 + 2 * (history - 1) + 3 * parameters.steps.size)
+    joints, history, remembered = parameters.rate.size, parameters.layout.history, parameters.layout.remembered
+    return joints * (1 + (history - 1) + 4 + 2 * (history - 1) + remembered + 3 * parameters.steps.size)
 
 
 @kernel(fastmath=FASTMATH)

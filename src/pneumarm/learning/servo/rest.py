@@ -1,17 +1,24 @@
 """A joint that is to stay at a goal: when it is nearly at rest there, and what moves it then."""
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pneumarm.arm.seam import ArmSpec
-from pneumarm.kernels import kernel
+from pneumarm.learning.servo.at_rest import (
+    Resting,
+    RestParameters,
+    choose_joints,
+    leave_goals,
+    limit_pulses,
+    look_at_joints,
+    note_pulses,
+)
 from pneumarm.learning.servo.commands import NEAR
 from pneumarm.learning.servo.foresight import Foresight
 from pneumarm.learning.servo.settings import ServoSettings
-from pneumarm.learning.servo.two_ways import TwoWays
+from pneumarm.learning.servo.two_ways import ways_of, ways_parameters
 from pneumarm.simulation.simulation import Simulation
 
 _LOOK = 0.134, 0.4  # s over which readings are averaged where the arm is nearly at rest: at least, at most
@@ -46,48 +53,6 @@ _COUNTED, _MORE = 2.0, 4.0  # of a joint with one muscle: most tolerances of an 
 _INTEGRAL = 0.5  # share of the mean error that is added to what is asked for, after every look
 
 
-@kernel
-def look_back(readings, look, mean, drift):  # type: ignore[no-untyped-def]
-    """Set the ``mean`` (joints,) of the last ``look`` readings (n, joints), and how far that of each half differs.
-
-    Where there are fewer readings their halves are taken. Loops, as NumPy takes ten times as long for so few numbers.
-    """
-    n, half = min(look, len(readings)), look // 2
-    first = len(readings) - n
-    for j in range(readings.shape[1]):
-        total, early, late = 0.0, 0.0, 0.0
-        for i in range(n):
-            total += readings[first + i, j]
-        for i in range(min(half, n)):
-            early += readings[first + i, j]
-        for i in range(len(readings) - min(half, n), len(readings)):
-            late += readings[i, j]
-        mean[j], drift[j] = total / n, abs(late / half - early / half)
-
-
-@kernel
-def extent(readings, span):  # type: ignore[no-untyped-def]
-    """Set how far ``readings`` (n, joints) extend, ``span`` (joints,)."""
-    for j in range(readings.shape[1]):
-        low = high = readings[0, j]
-        for i in range(1, len(readings)):
-            low, high = min(low, readings[i, j]), max(high, readings[i, j])
-        span[j] = high - low
-
-
-@kernel
-def variance(readings, scatter):  # type: ignore[no-untyped-def]
-    """Set the variance of ``readings`` (n, joints), ``scatter`` (joints,)."""
-    n = len(readings)
-    for j in range(readings.shape[1]):
-        total, squares = 0.0, 0.0
-        for i in range(n):
-            total += readings[i, j]
-        for i in range(n):
-            squares += (readings[i, j] - total / n) ** 2
-        scatter[j] = squares / n
-
-
 class Rest:
     """How all joints of an arm come to rest, and are kept there.
 
@@ -112,78 +77,44 @@ class Rest:
     """
 
     def __init__(self, spec: ArmSpec, simulation: Simulation, wanted: ServoSettings) -> None:
-        self._spec, self._unit = spec, wanted.tolerance * spec.counts_per_degree
-        tolerance = self._unit * (1.0 if spec.pulses else _COARSE)
-        self.tolerance = tolerance
+        fine = is_fine(spec, simulation)
+        self._spec, self.parameters = spec, rest_parameters(spec, simulation, wanted)
+        self.tolerance = self.parameters.tolerance
         """Tolerance of a joint that comes to rest [counts]."""
-        self._near, self._still, self._most = NEAR * tolerance, _STILL * tolerance, _BIASED * tolerance
-        noise = float((wanted.reading_noise * simulation.error_std[:, 0]).max())
-        least, most = (max(4, round(seconds / spec.period)) for seconds in _LOOK)
-        self._look = min(max(least, math.ceil((noise / (_SURE * tolerance)) ** 2)), most)
-        single = spec.muscles == 1
-        self._most_pulses = self._look if single else 1
-        # Whole periods move an arm by more than a tolerance: without pulses it is to swing, and not to be pushed.
-        fine = spec.pulses and (simulation.commands == "pulses" or simulation.spread)
-        self._counted, self._close, self._kept, self._steady, waited = math.inf, 0.0, 0.0, math.inf, 0.0
-        if single and fine:
-            self._counted, self._close, self._kept = _COUNTED * tolerance, math.inf, _MORE * tolerance
-            self._steady, waited = _NOISY * noise**2 + (_STEADY * tolerance) ** 2, _WAITED
-        elif single or fine:
-            self._close, self._kept = _CLOSE * tolerance, _KEPT * tolerance
-        swing = _FAR_SWING if single else _SWING
-        self._swing = max(swing * tolerance, _ANSWERED * noise) if fine else math.inf
-        self._slowly, self._waited, self._foreseen = (
-            max(self._look, round(time / spec.period)) for time in (_SLOWLY, waited, _FORESEEN)
-        )
-        self._angles = np.zeros((max(self._slowly, self._waited, self._foreseen), spec.joints))  # the newest last
-        self._seen = 0  # how many of them
         self._foresight = Foresight(simulation) if fine else None
         self._after = slice(*(round(time / spec.period) for time in _AFTER))
-        self._stays = _STAYS * tolerance + _STAYS_NOISE * noise
-        self._seen_still = _SEEN_STILL * tolerance + _SEEN_STILL_NOISE * noise
-        left = _ANSWERED * noise / math.sqrt(self._look)
-        self._quiet_below = max(wanted.quiet * tolerance, left / 2)
-        self._alert_above = max(wanted.alert * tolerance, left)
-        lowest, highest = np.moveaxis(simulation.pressure_range, -1, 0)
-        self._empty = lowest + _EMPTY * (highest - lowest)
-        known = wanted.ways if len(wanted.ways) == _KNOWN * spec.joints else ()
-        self._joints = [_Joint(spec, known[_KNOWN * j : _KNOWN * (j + 1)]) for j in range(spec.joints)]
-        self._actively, self._share = (fine or not spec.pulses) and not single, spec.period / _SWINGING
-        self._arrived = round(_ARRIVED / spec.period)
-        self._pulse = np.zeros((spec.joints, 2))  # the last of each joint
+        self._stays = _STAYS * self.tolerance + _STAYS_NOISE * _noise(simulation, wanted)
+        self.state = resting(self.parameters, spec.joints, wanted.ways)
+        leave_goals(self.parameters, self.state)
 
     @property
     def ways(self) -> tuple[float, ...]:
         """What was learned of the joints of this arm, as in :attr:`.ServoSettings.ways`."""
-        return tuple(error for rest in self._joints for ways in (rest.damped, rest.active) for error in ways.known)
+        return tuple(np.hstack([self.state.damped.off, self.state.active.off]).ravel().tolist())
 
     @property
     def bias(self) -> NDArray[np.float64]:
         """What is added to what is asked for, shape (joints,) [counts]: integral action."""
-        return np.array([rest.bias for rest in self._joints])
+        return self.state.bias.copy()
 
     @property
     def calm(self) -> NDArray[np.bool_]:
         """Which joints are nearly at rest and get single pulses, shape (joints,)."""
-        return np.array([rest.calm for rest in self._joints])
+        return self.state.calm.copy()
 
     @property
     def active(self) -> NDArray[np.bool_]:
         """Which joints are moved by their policy in every period, also near their goal, shape (joints,)."""
-        return np.array([rest.active.second for rest in self._joints])
+        off = self.state.active.off
+        return np.asarray(off[:, 1] < off[:, 0])
 
     def forget_readings(self) -> None:
         """Note that the arm was moved by others."""
-        self._seen = 0
+        self.state.seen[0] = 0
 
     def leave(self) -> None:
         """Note that something else is asked for."""
-        self._pulse[:] = 0.0
-        for rest in self._joints:
-            rest.leave()
-            rest.near = 0
-            rest.damped.leave()
-            rest.active.leave()
+        leave_goals(self.parameters, self.state)
 
     def which_act(
         self,
@@ -197,59 +128,9 @@ class Rest:
         ``now`` is what is asked for, ``stays`` whether that will stay as it is, and ``angle`` what is read, all
         (joints,), and ``state`` the scaled state (state_size,).
         """
-        self._angles[:-1] = self._angles[1:]
-        self._angles[-1] = angle
-        self._seen = seen = min(self._seen + 1, len(self._angles))
-        mean, drift, longer, scatter, lately = np.empty((5, now.size))
-        readings = self._angles[-seen:]
-        look_back(readings, self._look, mean, drift)
-        extent(readings[-self._slowly :], longer)
-        extent(readings[-self._foreseen :], lately)
-        variance(readings[-self._waited :], scatter)
-        error = now - mean
-        slow = (seen >= self._slowly) & (longer < self._still + _EASY * np.abs(error))
-        steady = (seen >= self._waited) & (scatter < self._steady)
-        still = (seen >= self._foreseen) & (lately < self._seen_still)
-        asked = stays & ~still & (np.abs(error) <= self._near) & [not rest.calm for rest in self._joints]
-        steady &= still | self._stay(asked, state)
-        acts, saturated = np.ones(now.size, bool), np.abs(self._pulse).max(axis=1) >= 1
-        for j, rest in enumerate(self._joints):
-            far, fast = _LEAVING if rest.calm else (1.0, 1.0)
-            off = now[j] - readings[-1, j]
-            if rest.swings >= _SWINGS or rest.damped.is_tried:
-                rest.damped.see(off / self.tolerance)
-            if seen < self._look or not stays[j]:
-                rest.leave()
-                continue
-            rest.near += abs(off) <= self._near or rest.near > 0
-            if rest.near and self._actively:
-                if rest.near > self._arrived:
-                    rest.active.see(off / self._unit)
-                if rest.active.second:
-                    rest.swings = 0
-                    rest.mark_moving(_FARTHER * self.tolerance, off * self._share if abs(off) < self._close else 0.0)
-                    continue
-            rest.see(off, self._swing)
-            if abs(error[j]) > far * self._near:
-                rest.leave_goal(still[j])
-                acts[j] = rest.swings < _SWINGS or rest.damped.second
-                continue
-            if not (rest.calm or steady[j]) or (drift[j] > fast * self._still and not slow[j]):
-                counted = min(max(error[j], -self._counted), self._counted) if abs(error[j]) < self._close else 0.0
-                rest.mark_moving(self._kept, counted * self._share)
-                acts[j] = rest.swings < _SWINGS or rest.damped.second
-                continue
-            rest.calm, rest.error = True, error[j]
-            rest.quiet = abs(error[j]) < (self._alert_above if rest.quiet else self._quiet_below)
-            rest.look = max(rest.look - 1, 0)
-            begins = not rest.quiet and rest.look == 0
-            if begins:
-                rest.begin(error[j], self._most_pulses)
-            acts[j] = not rest.quiet and (rest.left > 0 or saturated[j])
-            if acts[j]:
-                rest.left, rest.look = max(rest.left - 1, 0), self._look
-                if begins and not saturated[j]:
-                    rest.bias = float(np.clip(rest.bias + _INTEGRAL * error[j], -self._most, self._most))
+        look_at_joints(self.parameters, self.state, now, stays, angle)
+        acts = np.ones(now.size, bool)
+        choose_joints(self.parameters, self.state, now, stays, self._stay(self.state.asked, state), acts)
         return acts
 
     def shaped(
@@ -260,12 +141,10 @@ class Rest:
         state: NDArray[np.float32],
     ) -> NDArray[np.float64]:
         """Return what is done of a ``command`` (joints, 2) by the joints that may act; ``pressure`` (joints, 2)."""
-        calm = self.calm
-        command[calm[:, None] & (command < 0) & (pressure < self._empty)] = 0.0
-        command[~acts] = 0.0
-        for j in np.flatnonzero(calm & acts & np.any(command != 0, axis=1)):
+        limit_pulses(self.parameters, self.state, pressure, acts, command)
+        for j in np.flatnonzero(self.state.calm & acts & np.any(command != 0, axis=1)):
             command[j] = self._sized(int(j), state, command)
-        self._pulse[acts] = command[acts]
+        note_pulses(self.state, acts, command)
         return command
 
     def _sized(self, joint: int, state: NDArray[np.float32], command: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -279,8 +158,7 @@ class Rest:
         tried = np.zeros((len(size), *command.shape))
         tried[:, joint] = np.copysign(size, command[joint])
         angle = self._foresight.angles(state, tried.reshape(len(tried), -1), self._after.stop)[:, self._after, joint]
-        rest = self._joints[joint]
-        short = _WANTED * rest.error + _BESIDES * rest.bias - (angle - angle[0])
+        short = _WANTED * self.state.error[joint] + _BESIDES * self.state.bias[joint] - (angle - angle[0])
         chosen: NDArray[np.float64] = tried[np.abs(short).mean(axis=1).argmin(), joint]
         return chosen
 
@@ -292,52 +170,111 @@ class Rest:
         if self._foresight is None or not asked.any():
             return np.ones(asked.size, bool)
         closed = np.zeros((1, 2 * asked.size))
-        moved = np.ptp(self._foresight.angles(state, closed, self._foreseen)[0], axis=0)
+        moved = np.ptp(self._foresight.angles(state, closed, self.parameters.foreseen)[0], axis=0)
         return ~asked | (moved <= self._stays)
 
 
-class _Joint:
-    """How one joint is nearly at rest."""
+def is_fine(spec: ArmSpec, simulation: Simulation) -> bool:
+    """Return whether pulses move an arm by less than a tolerance, as far as its simulation knows.
 
-    def __init__(self, spec: ArmSpec, known: Sequence[float]) -> None:
-        period, ways = spec.period, known[2:]
-        self.damped = TwoWays(period, _DAMPED, known[:2])
-        if spec.pulses:
-            self.active = TwoWays(period, _ACTIVE, ways)
-        else:
-            self.active = TwoWays(period, _ACTIVE_WHOLE, ways, _COUNTS_WHOLE)
-        self.near = 0  # turns since it first was near this goal
-        self.leave()
+    Whole periods move it by more: without pulses it is to swing, and not to be pushed.
+    """
+    return spec.pulses and (simulation.commands == "pulses" or simulation.spread)
 
-    def leave(self) -> None:
-        """Note that it is far from what is asked for, or that this moves."""
-        self.swings, self._side = 0, 0.0
-        self.bias = 0.0
-        self.mark_moving(0.0, 0.0)
 
-    def leave_goal(self, still: np.bool_) -> None:
-        """Note that it is far from its goal, and whether it lies still there: then its swings are over."""
-        if still:
-            self.leave()
-        self.bias = 0.0
-        self.mark_moving(0.0, 0.0)
+def _noise(simulation: Simulation, wanted: ServoSettings) -> float:
+    """Return the noise of a reading of an angle [counts]."""
+    return float((wanted.reading_noise * simulation.error_std[:, 0]).max())
 
-    def mark_moving(self, kept: float, added: float) -> None:
-        """Note that it is near, but moves: its bias, with what is ``added``, is ``kept`` at most."""
-        self.calm, self.quiet, self.look = False, False, 0
-        self.left, self._pulses, self.error, self._before = 0, 1, 0.0, 0.0
-        if self.swings < _SWINGS:
-            self.bias = min(max(self.bias + added, -kept), kept)
 
-    def begin(self, error: float, most: int) -> None:
-        """Note that a pulse is due for the ``error``; where those before did little, several in a row, ``most``."""
-        done = error * self._before <= 0 or abs(error) < _DONE * abs(self._before)
-        self._pulses, self._before = 1 if done else min(2 * self._pulses, most), error
-        self.left = self._pulses
+def rest_parameters(spec: ArmSpec, simulation: Simulation, wanted: ServoSettings) -> RestParameters:
+    """Return the numbers by which the joints of an arm come to rest."""
+    unit = wanted.tolerance * spec.counts_per_degree
+    tolerance = unit * (1.0 if spec.pulses else _COARSE)
+    noise, single, fine = _noise(simulation, wanted), spec.muscles == 1, is_fine(spec, simulation)
+    least, most = (max(4, round(seconds / spec.period)) for seconds in _LOOK)
+    look = min(max(least, math.ceil((noise / (_SURE * tolerance)) ** 2)), most)
+    counted, close, kept, steady, waited = math.inf, 0.0, 0.0, math.inf, 0.0
+    if single and fine:
+        counted, close, kept = _COUNTED * tolerance, math.inf, _MORE * tolerance
+        steady, waited = _NOISY * noise**2 + (_STEADY * tolerance) ** 2, _WAITED
+    elif single or fine:
+        close, kept = _CLOSE * tolerance, _KEPT * tolerance
+    swing = _FAR_SWING if single else _SWING
+    slowly, waiting, foreseen = (max(look, round(time / spec.period)) for time in (_SLOWLY, waited, _FORESEEN))
+    left = _ANSWERED * noise / math.sqrt(look)
+    lowest, highest = np.moveaxis(simulation.pressure_range, -1, 0)
+    active = (_ACTIVE,) if spec.pulses else (_ACTIVE_WHOLE, _COUNTS_WHOLE)
+    return RestParameters(
+        tolerance=tolerance,
+        unit=unit,
+        near=NEAR * tolerance,
+        still=_STILL * tolerance,
+        easy=_EASY,
+        steady=steady,
+        seen_still=_SEEN_STILL * tolerance + _SEEN_STILL_NOISE * noise,
+        counted=counted,
+        close=close,
+        kept=kept,
+        swing=max(swing * tolerance, _ANSWERED * noise) if fine else math.inf,
+        farther=_FARTHER * tolerance,
+        share=spec.period / _SWINGING,
+        far=_LEAVING[0],
+        fast=_LEAVING[1],
+        quiet=max(wanted.quiet * tolerance, left / 2),
+        alert=max(wanted.alert * tolerance, left),
+        most_bias=_BIASED * tolerance,
+        integral=_INTEGRAL,
+        done=_DONE,
+        most_pulses=look if single else 1,
+        swings=_SWINGS,
+        look=look,
+        slowly=slowly,
+        waited=waiting,
+        foreseen=foreseen,
+        arrived=round(_ARRIVED / spec.period),
+        actively=(fine or not spec.pulses) and not single,
+        damped=ways_parameters(spec.period, _DAMPED),
+        active=ways_parameters(spec.period, *active),
+        empty=lowest + _EMPTY * (highest - lowest),
+    )
 
-    def see(self, error: float, swing: float) -> None:
-        """Count how often the ``error`` went from one side of the goal to the other, further than ``swing``."""
-        if abs(error) > swing:
-            side = math.copysign(1.0, error)
-            self.swings += side == -self._side
-            self._side = side
+
+def resting(parameters: RestParameters, joints: int, known: tuple[float, ...] = ()) -> Resting:
+    """Return what changes, at first, where so much is ``known`` as in :attr:`.ServoSettings.ways`."""
+    numbers = np.reshape(known, (joints, _KNOWN)) if len(known) == _KNOWN * joints else np.empty((joints, 0))
+
+    def floats() -> NDArray[np.float64]:
+        return np.zeros(joints)
+
+    def whole() -> NDArray[np.int64]:
+        return np.zeros(joints, np.int64)
+
+    def flags() -> NDArray[np.bool_]:
+        return np.zeros(joints, np.bool_)
+
+    longest = max(parameters.slowly, parameters.waited, parameters.foreseen)
+    return Resting(
+        angles=np.zeros((longest, joints)),
+        seen=np.zeros(1, np.int64),
+        pulse=np.zeros((joints, 2)),
+        missed=floats(),
+        drift=floats(),
+        slow=flags(),
+        steady=flags(),
+        still=flags(),
+        asked=flags(),
+        calm=flags(),
+        quiet=flags(),
+        look=whole(),
+        left=whole(),
+        pulses=whole(),
+        error=floats(),
+        before=floats(),
+        bias=floats(),
+        swings=whole(),
+        side=floats(),
+        near=whole(),
+        damped=ways_of(list(numbers[:, :2]), parameters.damped.hoped),
+        active=ways_of(list(numbers[:, 2:]), parameters.active.hoped),
+    )

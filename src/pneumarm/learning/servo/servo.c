@@ -1,124 +1,105 @@
-/* A servo that pneumarm has learned, as C99 that needs no library.
+/* A servo that pneumarm has learned, whole, as C99 that needs no library.
  *
- *     float state[SERVO_STATE], reference[SERVO_PREVIEWS][SERVO_JOINTS], pulses[SERVO_JOINTS][2];
- *     servo_act(state, reference, pulses);        once a control period, after the sensors have been read
+ *     real angle[SERVO_JOINTS], pressure[2 * SERVO_JOINTS];        what was read, in sensor counts
+ *     real path[SERVO_PATH * SERVO_JOINTS];                        what is asked for, in counts
+ *     real pulses[2 * SERVO_JOINTS];
  *
- * state        in sensor counts, newest first: for each of SERVO_HISTORY periods and each joint its angle, velocity
- *              [counts/ms], pressure of muscle 1 and of muscle 2, then what further sensors say; and after all of
- *              these the commands of the SERVO_HISTORY - 1 periods before, newest first, joint after joint.
- *              In the first period, with the arm at rest, all periods are alike, velocities and commands 0.
- * reference    where each joint is wanted to be at servo_ahead[] control periods from now [counts].
- * pulses       for each muscle the share of the period for which its inlet (above 0) or exhaust (below 0) is open.
+ *     servo_begin();                                               once, the arm at rest with its valves closed
+ *     servo_ask();                                                 whenever something else is asked for
+ *     servo_act(angle, pressure, path, false, pulses);             once every SERVO_PERIOD seconds
  *
- * This is the policy. What pneumarm does besides, near a goal that stays, is not in it: single pulses with a look at
- * each, integral action, valves that stay closed at rest; and so is its guard: limit pressure and time yourself.
- */
+ * pressure     of muscle 1 and of muscle 2, joint after joint.
+ * path         where each joint is wanted to be: a control period ago, now, and in the periods to come, period after
+ *              period. A goal that stays is the same number SERVO_PATH times. The last argument tells whether the
+ *              reference is one that ever moves.
+ * pulses       for each muscle the share of the control period for which its inlet (above 0) or its exhaust (below 0)
+ *              is to be open, from now on.
+ *
+ * This is all that acts: window, policy, reference, and what brings a joint to rest and keeps it there; without plans
+ * and without a simulation. It is written from the very kernels that pneumarm runs. The guard is not in it: limit
+ * pressure and time yourself.
+ *
+ * With -DSERVO_REAL=float it computes in single precision throughout, as a small board does. -ffp-contract=off makes
+ * it agree with pneumarm to the last bit of double precision, and within rounding of the network's single precision.
+ * -DSERVO_EXAMPLE adds a program that moves a joint that does not move, and prints what it would do. */
+#include <math.h>
+#include <stdbool.h>
+#include <stdint.h>
+#ifdef __AVR__
+#include <avr/pgmspace.h>
+#define IN_FLASH PROGMEM
+#define FROM_FLASH_FLOAT32(p) pgm_read_float(p)
+#define FROM_FLASH_FLOAT64(p) pgm_read_float(p)
+#define FROM_FLASH_INT64(p) ((int16_t)pgm_read_word(p))
+#define FROM_FLASH_INT16(p) ((int16_t)pgm_read_word(p))
+#define FROM_FLASH_INT8(p) ((int8_t)pgm_read_byte(p))
+#else
+#define IN_FLASH
+#define FROM_FLASH_FLOAT32(p) (*(p))
+#define FROM_FLASH_FLOAT64(p) (*(p))
+#define FROM_FLASH_INT64(p) (*(p))
+#define FROM_FLASH_INT16(p) (*(p))
+#define FROM_FLASH_INT8(p) (*(p))
+#endif
+#ifndef SERVO_REAL
+#define SERVO_REAL double
+#endif
+typedef SERVO_REAL real;
+#define REAL(x) ((real)(x))
 
 /* PARAMETERS */
 
-/* As in learning/servo/inputs.py and learning/servo/commands.py. */
-#define SERVO_PRESSURE_CHANGE 5.0f
-#define SERVO_FAR 0.05f
-#define SERVO_COARSE (1.0f / 6.0f)
-#define SERVO_FINE (1.0f / 1.2f)
-#define SERVO_GAIN 1.25f
-
-static float servo_bent(float z) /* hyperbolic tangent within 7e-6: Lambert's continued fraction */
+void servo_begin(void)
 {
-    const float clip = 6.29701f;
-    float s;
-    z = z < clip ? z : clip;
-    z = z > -clip ? z : -clip;
-    s = z * z;
-    return z * (34459425.0f + s * (4729725.0f + s * (135135.0f + s * (990.0f + s))))
-           / (34459425.0f + s * (16216200.0f + s * (945945.0f + s * (13860.0f + s * 45.0f))));
+	begin_board();
 }
 
-static void servo_layer(const float *weights, int inputs, int outputs, const float *x, float *y, int bends)
+void servo_ask(void)
 {
-    for (int o = 0; o < outputs; o++) {
-        float sum = weights[inputs * outputs + o]; /* the last row holds the biases */
-        for (int i = 0; i < inputs; i++)
-            sum += weights[i * outputs + o] * x[i];
-        y[o] = bends ? servo_bent(sum) : sum;
-    }
+	ask_board();
 }
 
-static void servo_scale(const float *state, float *x)
+void servo_see(real *angle, real *pressure, real *path, bool follows)
 {
-    int place = 0;
-    for (int period = 0; period < SERVO_HISTORY; period++)
-        for (int i = 0; i < SERVO_OBSERVED; i++, place++)
-            x[place] = (state[place] - servo_offset[i]) / servo_scales[i];
-    for (int period = 1; period < SERVO_HISTORY; period++)
-        for (int i = 0; i < 2 * SERVO_JOINTS; i++, place++)
-            x[place] = state[place] / servo_command_scale[i];
+	see_board(angle, pressure, path, follows);
 }
 
-static void servo_see(const float *x, const float reference[SERVO_PREVIEWS][SERVO_JOINTS], float *inputs)
+void servo_think(void)
 {
-    int row = 0;
-    for (int joint = 0; joint < SERVO_JOINTS; joint++) {
-        const int angle = 4 * joint;
-        inputs[row++] = x[angle];
-        for (int lag = 1; lag < SERVO_HISTORY; lag++)
-            inputs[row++] = (x[angle] - x[lag * SERVO_OBSERVED + angle]) * (servo_rate[joint] / (float)lag);
-        for (int muscle = 0; muscle < 2; muscle++) {
-            const int place = angle + 2 + muscle;
-            const float before = SERVO_HISTORY > 1 ? x[SERVO_OBSERVED + place] : x[place];
-            inputs[row++] = x[place];
-            inputs[row++] = (x[place] - before) * SERVO_PRESSURE_CHANGE;
-        }
-    }
-    for (int i = 0; i < 2 * SERVO_JOINTS * (SERVO_HISTORY - 1); i++)
-        inputs[row++] = x[SERVO_HISTORY * SERVO_OBSERVED + i];
-    for (int joint = 0; joint < SERVO_JOINTS; joint++)
-        for (int p = 0; p < SERVO_PREVIEWS; p++) {
-            const float wanted = (reference[p][joint] - servo_offset[4 * joint]) / servo_scales[4 * joint];
-            const float distance = (wanted - x[4 * joint]) * servo_tolerances[joint];
-            inputs[row++] = distance * SERVO_FAR;
-            inputs[row++] = servo_bent(distance * SERVO_COARSE);
-            inputs[row++] = servo_bent(distance * SERVO_FINE);
-        }
+	/* NETWORK */();
 }
 
-static float servo_pulse(float said, float pressure, float limit)
+void servo_give(real *pressure, real *pulses)
 {
-    const float v = SERVO_GAIN * servo_bent(said);
-    float size = ((v < 0 ? -v : v) - SERVO_DEAD) / (1.0f - SERVO_DEAD);
-    if (v > 0 && pressure > limit)
-        size = 0;
-    size = size < 0 ? 0 : size > 1 ? 1 : size;
-    if (SERVO_STEP > 0) {
-        size = SERVO_STEP * (float)(int)(size / SERVO_STEP + 0.5f);
-        size = size > 1 ? 1 : size;
-    } else if (size < 0.5f * SERVO_SHORTEST)
-        size = 0;
-    else if (size > SERVO_WHOLE)
-        size = 1;
-    else if (size < SERVO_SHORTEST)
-        size = SERVO_SHORTEST;
-    return v > 0 ? size : -size;
+	act_board(pressure, pulses);
 }
 
-void servo_act(
-    const float state[SERVO_STATE],
-    const float reference[SERVO_PREVIEWS][SERVO_JOINTS],
-    float pulses[SERVO_JOINTS][2])
+void servo_act(real *angle, real *pressure, real *path, bool follows, real *pulses)
 {
-    float x[SERVO_STATE], a[SERVO_WIDEST], b[SERVO_WIDEST], *now = a, *next = b;
-    const float *weights = servo_weights;
-    servo_scale(state, x);
-    servo_see(x, reference, now);
-    for (int layer = 0; layer < SERVO_LAYERS; layer++) {
-        float *free = now;
-        servo_layer(weights, servo_sizes[layer], servo_sizes[layer + 1], now, next, layer < SERVO_LAYERS - 1);
-        weights += (servo_sizes[layer] + 1) * servo_sizes[layer + 1];
-        now = next;
-        next = free;
-    }
-    for (int joint = 0; joint < SERVO_JOINTS; joint++)
-        for (int muscle = 0; muscle < 2; muscle++)
-            pulses[joint][muscle] =
-                servo_pulse(now[2 * joint + muscle], x[4 * joint + 2 + muscle], servo_inlet[joint][muscle]);
+	servo_see(angle, pressure, path, follows);
+	servo_think();
+	servo_give(pressure, pulses);
 }
+
+#ifdef SERVO_EXAMPLE
+#include <stdio.h>
+
+int main(void)
+{
+	real angle[SERVO_JOINTS], pressure[2 * SERVO_JOINTS], path[SERVO_PATH * SERVO_JOINTS], pulses[2 * SERVO_JOINTS];
+	for (int joint = 0; joint < SERVO_JOINTS; joint++) {
+		angle[joint] = SERVO_MIDDLE; /* read them from your sensors */
+		pressure[2 * joint] = pressure[2 * joint + 1] = SERVO_MOST_PRESSURE / 2;
+	}
+	for (int i = 0; i < SERVO_PATH * SERVO_JOINTS; i++)
+		path[i] = SERVO_MIDDLE + 10 * SERVO_COUNTS_PER_DEGREE;
+	servo_begin();
+	for (int turn = 0; turn < 10; turn++) {
+		servo_act(angle, pressure, path, false, pulses);
+		for (int i = 0; i < 2 * SERVO_JOINTS; i++)
+			printf("%8.4f", (double)pulses[i]); /* open the valves for this share of the period */
+		printf("\n"); /* and wait for the rest of it */
+	}
+	return 0;
+}
+#endif

@@ -24,6 +24,7 @@ LONG = (
     "guarantee",
     "held_out",
     "holding",
+    "hysteresis",
     "live",
     "minutes",
     "moving",

@@ -1,7 +1,10 @@
 """A board that drives alone: it settles at goals, understands what is typed, and vents where something is wrong."""
 
+import json
+import os
 import random
 import shutil
+import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -11,6 +14,7 @@ import pytest
 
 from learning.in_c import InC
 from pneumarm.arm.virtual import VirtualArm
+from pneumarm.cli import main
 from pneumarm.control.deploy import BOARDS, Built, deploy
 from pneumarm.errors import UnusableInput
 from pneumarm.learning import ServoSettings
@@ -271,3 +275,30 @@ def test_what_does_not_fit_is_said_with_what_would(simulation: Simulation, tmp_p
         deploy(untrained(replace(simulation, spec=spec)), "uno", tmp_path)
     with pytest.raises(UnusableInput, match="no sources of boards"):
         deploy(untrained(simulation), "uno", tmp_path, tmp_path)
+
+
+def test_from_an_agent_to_a_board_by_commands(
+    simulation: Simulation, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A stand-in for avrdude keeps what it is to flash; that it drives is what other tests show."""
+    agent, port, flashed = tmp_path / "arm.agent", tmp_path / "port", tmp_path / "flashed.hex"
+    untrained(simulation).save(agent)
+    port.touch()
+    avrdude = tmp_path / "avrdude"
+    avrdude.write_text(
+        f"#!{sys.executable}\nimport shutil, sys\n"
+        f"shutil.copy(sys.argv[-1].removeprefix('flash:w:').removesuffix(':i'), {str(flashed)!r})\n"
+    )
+    avrdude.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{tmp_path}:{os.environ['PATH']}")
+    for command in (["deploy", agent, "--out", tmp_path / "out", "--json"], ["arm", "flash", port, "--agent", agent]):
+        with pytest.raises(SystemExit) as ended:
+            main([str(word) for word in command])
+        assert ended.value.code == 0
+    told = json.loads(capsys.readouterr().out.splitlines()[0])
+    assert told["flash"] < BOARDS["uno"].flash
+    with Chip(flashed) as chip:
+        chip.set_count(ANGLE, MIDDLE)
+        chip.run(0.05)
+        assert Typist(chip).type("arm") == "ok"
+        assert Typist(chip).type("where") == "0.0 deg, goal 0.0, driving"

@@ -36,7 +36,7 @@ class Board(NamedTuple):
     """Cycles a second."""
 
 
-BOARDS = {"uno": Board(30_720, 2_048, 288, 210_000, 30, 16e6)}
+BOARDS = {"uno": Board(30_720, 2_048, 288, 170_000, 22, 16e6)}
 """Boards by name: an Arduino Uno or Nano."""
 _TIME = 0.8
 """Share of the control period that a decision may take; the rest is for lines and for what comes late."""

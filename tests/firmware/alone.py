@@ -25,6 +25,7 @@ from pneumarm.moving.settling import settled_at
 from pneumarm.statistics import mean_estimate
 from tests.firmware.board import SimulatedBoard, single_conversions
 from tests.firmware.chip import FREQUENCY, Chip
+from tests.firmware.second_machine import SecondChip
 
 HOLD = 2.0
 """For how long each goal is held [s]."""
@@ -58,7 +59,7 @@ def variables(built: Built) -> dict[str, int]:
 class Typist:
     """Types lines to a chip with the program that drives alone."""
 
-    def __init__(self, chip: Chip) -> None:
+    def __init__(self, chip: Chip | SecondChip) -> None:
         self.chip = chip
 
     def type(self, line: str | bytes, wait: float = _ANSWER) -> str:

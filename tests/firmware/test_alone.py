@@ -28,7 +28,9 @@ from pneumarm.transitions import Store
 from tests.firmware.alone import Alone, Typist, goals_of, variables
 from tests.firmware.board import valves_of
 from tests.firmware.build import missing
-from tests.firmware.chip import Chip
+from tests.firmware.chip import FREQUENCY, Change, Chip
+from tests.firmware.second_machine import SecondChip
+from tests.firmware.second_machine import missing as second_missing
 
 pytestmark = pytest.mark.skipif(bool(missing()), reason=missing())
 ANGLE, PRESSURES = 0, (1, 2)
@@ -142,6 +144,32 @@ def test_the_board_decides_as_c_on_this_machine_to_the_last_bit(
     assert 20 < opened < turns  # of the others it is at rest
 
 
+def moved_alone(chip: Chip | SecondChip) -> list[Change]:
+    """Return how the pins of a board changed that held a goal while its sensors said the same as another one's."""
+    rng = random.Random(2)
+    typist, angle = Typist(chip), float(MIDDLE)
+    for channel, count in ((ANGLE, MIDDLE), *((channel, AIR) for channel in PRESSURES)):
+        chip.set_count(channel, count)
+    chip.run_until(round(0.05 * FREQUENCY))
+    assert typist.type("arm", 0.001) in ("", "ok")
+    for turn in range(120):
+        chip.run_until(round((0.05 + 0.025 + turn * PERIOD) * FREQUENCY))  # not while it reads
+        angle = MIDDLE + 150 * 0.96**turn * rng.uniform(-1, 1)
+        chip.set_count(ANGLE, round(angle))
+        chip.set_count(PRESSURES[0], rng.randrange(60, 170))
+    return chip.changes
+
+
+@pytest.mark.thorough
+@pytest.mark.skipif(bool(second_missing()), reason=second_missing())
+def test_a_second_simulator_agrees_move_for_move(built: Built) -> None:
+    with Chip(built.hex) as chip, SecondChip(built.hex) as other:
+        one, two = moved_alone(chip), moved_alone(other)
+    assert len(one) > 40
+    assert [change.pins & 0xFF for change in one] == [change.pins & 0xFF for change in two]
+    assert max(abs(a.cycle - b.cycle) for a, b in zip(one, two, strict=True)) < 0.5e-3 * FREQUENCY
+
+
 def test_nothing_moves_until_somebody_arms_it(typist: Typist) -> None:
     assert typist.type("where").startswith("0.0 deg, goal ")
     assert "type arm" in typist.type("goto 10")
@@ -185,6 +213,21 @@ def test_a_dead_angle_sensor_vents(driving: Typist, count: int) -> None:
     driving.chip.run(1.0)
     assert vented(driving.chip)  # until somebody has looked, and armed again
     assert driving.type("arm") == "ok"
+
+
+def test_a_joint_may_lie_at_the_end_of_its_range_unless_it_is_wanted_elsewhere(driving: Typist) -> None:
+    for count in (600, 700, 800, 900, 1000, 1023):
+        driving.chip.set_count(ANGLE, count)
+        driving.chip.run(2 * PERIOD)
+    assert driving.type("hold") == "ok"
+    driving.chip.run(5.0)
+    assert "driving" in driving.type("where")
+    assert driving.type("goto 0") == "ok"
+    driving.chip.run(1.5)
+    assert "driving" in driving.type("where")  # it may be on its way
+    driving.chip.run(1.0)
+    assert "end of its range" in driving.type("where")
+    assert vented(driving.chip)
 
 
 def test_over_pressure_vents_at_once_and_stays(driving: Typist) -> None:

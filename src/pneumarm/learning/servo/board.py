@@ -43,6 +43,7 @@ from pneumarm.learning.servo.networks import Network, network_of, run_network
 from pneumarm.learning.servo.quantised import Quantised, Units, quantised_of, run_quantised, units_of
 from pneumarm.learning.servo.rest import rest_parameters, resting
 from pneumarm.learning.servo.spreading import spread_pulses
+from pneumarm.learning.servo.two_ways import is_second_better
 from pneumarm.simulation.arm import SimulationArm
 from pneumarm.simulation.layout import Layout
 from pneumarm.task.tracker import write_observation
@@ -190,8 +191,7 @@ def act_board(parameters, board, pressure, command):  # type: ignore[no-untyped-
     """Set the ``command`` (joints, 2) by what the policy said of the inputs, ``board.said``."""
     joints, rest = board.moves.shape[0], board.rest
     for j in range(joints):
-        active = rest.active.off[j, 1] < rest.active.off[j, 0]
-        board.underway[j, 0] = board.stays[j] and not rest.calm[j] and not active
+        board.underway[j, 0] = board.stays[j] and not rest.calm[j] and not is_second_better(rest.active, j)
     write_commands(parameters.commands, board.x, board.underway, board.said, board.slope, board.pulses)
     for j in range(joints):
         for muscle in range(2):

@@ -19,7 +19,7 @@ from pneumarm.learning.servo.at_rest import (
 from pneumarm.learning.servo.commands import NEAR
 from pneumarm.learning.servo.foresight import Foresight
 from pneumarm.learning.servo.settings import ServoSettings
-from pneumarm.learning.servo.two_ways import ways_of, ways_parameters
+from pneumarm.learning.servo.two_ways import is_second_better, ways_of, ways_parameters
 from pneumarm.simulation.simulation import Simulation
 
 _LOOK = 0.134, 0.4  # s over which readings are averaged where the arm is nearly at rest: at least, at most
@@ -106,8 +106,7 @@ class Rest:
     @property
     def active(self) -> NDArray[np.bool_]:
         """Which joints are moved by their policy in every period, also near their goal, shape (joints,)."""
-        off = self.state.active.off
-        return np.asarray(off[:, 1] < off[:, 0])
+        return np.array([is_second_better(self.state.active, j) for j in range(len(self.state.calm))])
 
     def forget_readings(self) -> None:
         """Note that the arm was moved by others."""

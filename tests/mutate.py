@@ -119,7 +119,7 @@ def folder_of(file: Path) -> str:
 
 def folders(root: Path) -> set[str]:
     """Return all folders that code lies in, see :func:`folder_of`."""
-    files = [*(root / "src").rglob("*.py"), *(root / "firmware").glob("*.c")]
+    files = [*(root / "src").rglob("*.py"), *(root / "firmware").rglob("*.c")]
     return {folder_of(file.relative_to(root)) for file in files}
 
 

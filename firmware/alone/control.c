@@ -191,7 +191,7 @@ static void decide(void)
 	struct sample sample;
 	float angle[1], pressure[2], path[SERVO_PATH], share[2];
 	converter_read(&sample);
-	if (!limits_believe(&sample)) {
+	if (!limits_believe(&sample, reference_now())) {
 		control_stop(SENSOR);
 		return;
 	}

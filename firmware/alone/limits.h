@@ -10,8 +10,9 @@
 /* Forget what was before. */
 void limits_start(void);
 
-/* Return whether the sensors of joint 1 can be believed: a dead one reads the end of its range. */
-bool limits_believe(const struct sample *sample);
+/* Return whether the angle of joint 1 can be believed, where it is `wanted` [counts]: a dead sensor reads the end of its
+ * range. */
+bool limits_believe(const struct sample *sample, int16_t wanted);
 
 /* Close what may not open of `codes` (joint 1: four bits), each open for `lengths` [PULSE_UNIT_US] of a `period`. */
 uint8_t limits_keep(const struct sample *sample, uint8_t codes, const uint16_t lengths[2], uint16_t period);

@@ -158,7 +158,7 @@ PANELS = {
     "Begin here": ("run", "live", "setup", "move", "track", "view"),
     "Step by step": ("collect", "coverage", "fit", "analyse", "train", "test", "transfer", "versions", "report"),
     "The arm, and other controllers": ("arm", "tune", "bound"),
-    "To other programs and places": ("import", "export", "copy"),
+    "To other programs and places": ("import", "export", "deploy", "copy"),
     "The thesis' experiments": ("experiment", "claims", "taguchi"),
     "This program": ("completion", "--help", "--version"),
 }

@@ -15,19 +15,25 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumarm.arm import guarded, open_arm
+from pneumarm.arm import Reading, guarded, open_arm
 from pneumarm.arm.virtual import VirtualArm
 from pneumarm.control import open_agent
 from pneumarm.control.deploy import BOARDS, Built, deploy
 from pneumarm.learning.servo.agent import ServoAgent
-from pneumarm.moving.movement import MoveSettings, move
+from pneumarm.moving.movement import MoveSettings, move, track
 from pneumarm.moving.settling import settled_at
 from pneumarm.statistics import mean_estimate
+from pneumarm.task.reference import parse_reference
 from tests.firmware.board import SimulatedBoard, single_conversions
 from tests.firmware.chip import FREQUENCY, Chip
+from tests.firmware.second_machine import SecondChip
 
 HOLD = 2.0
 """For how long each goal is held [s]."""
+SETTLING, SWING = 4.0, 12.0
+"""For how long a swing is followed before it counts, and then [s]."""
+SWINGS = ((0.2, 15.0), (0.5, 15.0), (1.0, 10.0))
+"""Frequencies [Hz] and amplitudes [degrees]."""
 PAINT = 0xC5
 """What memory is filled with, to see later how far the stack went."""
 _RAM_BEGINS, _RAM_ENDS = 0x100, 0x900
@@ -58,7 +64,7 @@ def variables(built: Built) -> dict[str, int]:
 class Typist:
     """Types lines to a chip with the program that drives alone."""
 
-    def __init__(self, chip: Chip) -> None:
+    def __init__(self, chip: Chip | SecondChip) -> None:
         self.chip = chip
 
     def type(self, line: str | bytes, wait: float = _ANSWER) -> str:
@@ -82,6 +88,7 @@ class Alone:
     def __init__(self, built: Built, arm: VirtualArm, seed: int = 0) -> None:
         self.arm = single_conversions(arm, seed)
         self.board = SimulatedBoard(self.arm, built.hex)
+        self._variables = variables(built)
         self.spec, self._first = arm.spec, _RAM_BEGINS + built.memory
         for address in range(self._first, _RAM_ENDS):
             self.board.chip.poke(address, PAINT)
@@ -121,6 +128,23 @@ class Alone:
         assert said == "ok", said
         return held(times, off)
 
+    def swing(self, frequency: float, amplitude: float) -> float:
+        """Ask for a swing and return its RMS error once it has gone on for a while [Hz, degrees]."""
+        assert self.type(f"sine {frequency:.2f} {amplitude:.2f}") == "ok"
+        off = []
+        next_ = 1e-6 * int.from_bytes(self._variable("next_us"), "little")
+        self.board.wait_until(next_ + self.spec.period - 0.006)  # between two decisions, not while one is made
+        for _ in range(round((SWING + SETTLING) / self.spec.period)):
+            self.board.wait(self.spec.period)
+            phase = np.frombuffer(self._variable("phase"), np.float32)[0]
+            ahead = 1e-6 * int.from_bytes(self._variable("next_us"), "little") - self.board.time
+            wanted = amplitude * np.sin(phase - 2 * np.pi * frequency * ahead)
+            off.append(float(np.degrees(self.arm.angle[0])) - wanted)
+        return float(np.sqrt(np.mean(np.square(off[round(SETTLING / self.spec.period) :]))))
+
+    def _variable(self, name: str) -> bytes:
+        return bytes(self.board.chip.peek(self._variables[name] + i) for i in range(4))
+
 
 def goals_of(agent: ServoAgent, count: int, seed: int) -> NDArray[np.float64]:
     """Return goals [degrees] that the arm can hold."""
@@ -145,6 +169,22 @@ def on_the_host(agent: ServoAgent, arm: VirtualArm, goals: Iterable[float]) -> I
             off.clear()
 
 
+def swung_by_the_host(agent: ServoAgent, arm: VirtualArm) -> Iterator[float]:
+    """Let the host's controller follow the same swings; give their RMS errors [degrees]."""
+    controller, off = agent.controller(), []
+
+    def look(_: Reading, wanted: NDArray[np.float64]) -> None:
+        off.append(float(np.degrees(arm.angle[0])) - float(agent.spec.degrees(wanted)[0]))
+
+    with guarded(arm) as safe:
+        for frequency, amplitude in SWINGS:
+            off.clear()
+            reference = parse_reference(f"sine:{frequency}Hz,{amplitude}deg", agent.spec)
+            track(safe, controller, reference, SETTLING + SWING, seen=look)
+            counted = off[-round(SWING / agent.spec.period) :]
+            yield float(np.sqrt(np.mean(np.square(counted))))
+
+
 def main() -> None:
     """Compare both, and print it."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -167,8 +207,13 @@ def main() -> None:
             for goal in goals:
                 found.append(alone.hold(goal))
                 taken.append(alone.decisions())
+            swings = [alone.swing(*one) for one in SWINGS]
             stack = alone.stack
     both: dict[str, list[Held]] = {"board": found, "host": list(on_the_host(agent, second, goals))}
+    third = open_arm(options.arm, options.seed)
+    assert isinstance(third, VirtualArm)
+    for (frequency, far), here, there in zip(SWINGS, swings, swung_by_the_host(agent, third), strict=True):
+        print(f"{frequency} Hz, {far} deg: RMS error on the board {here:.2f} deg, on the host {there:.2f} deg")
     for name, these in both.items():
         times = [one.settled for one in these if one.settled is not None]
         rest = np.mean([one.rest for one in these])

@@ -2,7 +2,8 @@
 
     python -m tests.firmware.pty_board --arm virtual:seed=1
 
-It prints the terminal's path, for ``pneumarm run --arm serial:PATH``, and goes on until it is interrupted.
+It prints the terminal's path, for ``pneumarm run --arm serial:PATH``, and goes on until it is interrupted. With
+``--program build/alone.hex``, from ``pneumarm deploy``, it is a board that drives alone: type lines at that terminal.
 """
 
 import argparse
@@ -12,6 +13,7 @@ import select
 import sys
 import tty
 from contextlib import suppress
+from pathlib import Path
 from time import monotonic
 
 from pneumarm.arm import open_arm
@@ -49,6 +51,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--arm", default="virtual", help="the virtual arm, as for pneumarm run")
     parser.add_argument("--seed", type=int, default=0, help="of the noise of its sensors")
+    parser.add_argument("--program", type=Path, help="another program than the host's")
     options = parser.parse_args()
     arm = open_arm(options.arm, options.seed)
     if not isinstance(arm, VirtualArm):
@@ -56,7 +59,7 @@ def main() -> None:
     master, slave = pty.openpty()
     tty.setraw(slave)
     os.set_blocking(master, False)
-    with SimulatedBoard(single_conversions(arm, options.seed)) as board:
+    with SimulatedBoard(single_conversions(arm, options.seed), options.program) as board:
         board.wait(0.1)  # compiles the physics before anyone counts the time
         print(os.ttyname(slave), flush=True)
         with suppress(KeyboardInterrupt):

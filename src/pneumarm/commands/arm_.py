@@ -33,8 +33,6 @@ from pneumarm.checkup.figures import JOINT_HEADER, MUSCLE_HEADER, joint_row, mus
 from pneumarm.commands.asking import AtTerminal, asked_for, calibrated, missing_of, resting
 from pneumarm.commands.common import Json, Measuring, Settings
 from pneumarm.console import say, show, table
-from pneumarm.control import open_agent
-from pneumarm.control.deploy import deploy
 from pneumarm.errors import ArmUnsound, UnusableInput
 from pneumarm.files import make_folder, require_folder, require_output, write_text
 from pneumarm.progress import Display, progress
@@ -457,6 +455,8 @@ def flash_(port: str, /, *, agent: Path | None = None, json: Json = False) -> No
         The agent that the board is to move its arm with, alone.
     """
     from pneumarm.arm.serial.flash import FIRMWARE, flash
+    from pneumarm.control import open_agent
+    from pneumarm.control.deploy import deploy
 
     place = port.removeprefix("serial:")
     with TemporaryDirectory() as folder:

@@ -6,9 +6,11 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from pneumarm.commands.common import Json
-from pneumarm.console import show, table
+from pneumarm.console import say, show, table
 from pneumarm.control import open_agent
 from pneumarm.control.deploy import BOARDS, FIRMWARE, deploy
+
+_OTHERWISE = 4.0  # ms that a recording's latency may differ from a decision's
 
 
 def deploy_(
@@ -33,7 +35,13 @@ def deploy_(
     firmware
         Folder of the boards' sources, as in a checkout of pneumarm.
     """
-    built, has = deploy(open_agent(agent, None), board, out, firmware), BOARDS[board]
+    opened = open_agent(agent)
+    built, has = deploy(opened, board, out, firmware), BOARDS[board]
+    if abs(1e3 * opened.spec.latency - built.milliseconds) > _OTHERWISE:
+        say(
+            f"recorded with {1e3 * opened.spec.latency:.0f} ms from a reading to the valves: an agent of a recording "
+            f"with latency = {1e-3 * built.milliseconds:.3f} in arm.toml settles faster on this board"
+        )
     result = {
         "hex": str(built.hex),
         "flash": built.flash,

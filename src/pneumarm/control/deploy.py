@@ -29,14 +29,14 @@ class Board(NamedTuple):
     stack: int
     """Bytes of it that the stack takes at most, and some more."""
     a_decision: int
-    """Cycles that a decision takes, interrupts included, ..."""
+    """Cycles that a decision takes while a goal is held, interrupts included; a swing takes a tenth more ..."""
     a_weight: int
     """... and that it takes longer for each weight of the policy."""
     frequency: float
     """Cycles a second."""
 
 
-BOARDS = {"uno": Board(30_720, 2_048, 288, 210_000, 30, 16e6)}
+BOARDS = {"uno": Board(30_720, 2_048, 288, 170_000, 22, 16e6)}
 """Boards by name: an Arduino Uno or Nano."""
 _TIME = 0.8
 """Share of the control period that a decision may take; the rest is for lines and for what comes late."""
@@ -52,7 +52,7 @@ class Built(NamedTuple):
     """Bytes of RAM, without the stack."""
     weights: int
     milliseconds: float
-    """That a decision takes, about."""
+    """That a decision takes while a goal is held, about."""
 
 
 def deploy(agent: AnyAgent, board: str, out: Path, firmware: Path = FIRMWARE) -> Built:

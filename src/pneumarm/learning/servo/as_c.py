@@ -67,11 +67,11 @@ def as_c(agent: ServoAgent, quantised: Quantised | None = None) -> str:
 
 
 def _with_products_by_hand(written: str) -> str:
-    """Return it with the sums of products that the AVR's compiler makes slow ones of."""
-    by_hand = resources.files("pneumarm.learning.servo").joinpath("products.c").read_text(encoding="utf-8")
-    begin = written.index("/* Return the sum of count products")
-    end = written.index("/*", written.rindex("/* Return the sum of count products") + 2)
-    return f"{written[:begin]}{by_hand}#else\n{written[begin:end].rstrip()}\n#endif\n\n{written[end:]}"
+    """Return it with sums of products that may be other ones: a board's, where its compiler makes slow code."""
+    head = "/* Return the sum of count products"
+    begin, end = written.index(head), written.index("/*", written.rindex(head) + 2)
+    own = written[begin:end].rstrip()
+    return f"{written[:begin]}#ifdef SERVO_PRODUCTS\n#include SERVO_PRODUCTS\n#else\n{own}\n#endif\n\n{written[end:]}"
 
 
 def _field(of: Kept, name: str) -> Kept:

@@ -4,7 +4,7 @@ What they do is told at :class:`~.rest.Rest`, which sets their numbers. They are
 allocation, because :mod:`~.in_c` writes the same statements as C.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,14 @@ from pneumarm.learning.servo.two_ways import Ways, WaysParameters, end_try, is_s
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
+Singles = NDArray[np.float32]
+_KINDS: dict[Any, type] = {Floats: np.float64, Ints: np.int64, Bools: np.bool_, Singles: np.float32}
+
+
+def blank(of: Any, joints: int, **shapes: tuple[int, ...]) -> dict[str, Any]:
+    """Return the arrays of a named tuple ``of`` them by name, all zeros, of shape (joints,) where none is given."""
+    kinds = {name: _KINDS[kind] for name, kind in of.__annotations__.items() if kind in _KINDS}
+    return {name: np.zeros(shapes.get(name, (joints,)), kind) for name, kind in kinds.items()}
 
 
 class RestParameters(NamedTuple):

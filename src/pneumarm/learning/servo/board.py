@@ -9,7 +9,6 @@ has to be (:mod:`~.foresight`); the policy's own pulse is taken.
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pneumarm.arm.guard import guarded
 from pneumarm.arm.reference import Reference, constant
@@ -17,8 +16,12 @@ from pneumarm.arm.seam import Reading, checked
 from pneumarm.kernels import kernel
 from pneumarm.learning.servo.agent import ServoAgent
 from pneumarm.learning.servo.at_rest import (
+    Bools,
+    Floats,
     Resting,
     RestParameters,
+    Singles,
+    blank,
     choose_joints,
     leave_goals,
     limit_pulses,
@@ -40,14 +43,11 @@ from pneumarm.learning.servo.networks import Network, network_of, run_network
 from pneumarm.learning.servo.quantised import Quantised, Units, quantised_of, run_quantised, units_of
 from pneumarm.learning.servo.rest import rest_parameters, resting
 from pneumarm.learning.servo.spreading import spread_pulses
+from pneumarm.learning.servo.two_ways import is_second_better
 from pneumarm.simulation.arm import SimulationArm
 from pneumarm.simulation.kernel import stops_by_angle
 from pneumarm.simulation.layout import Layout
 from pneumarm.task.tracker import write_observation
-
-Floats = NDArray[np.float64]
-Singles = NDArray[np.float32]
-Bools = NDArray[np.bool_]
 
 _GOALS, _HELD = 40, 1.5  # goals that inputs are looked at for, and for how long each [s]
 
@@ -200,8 +200,7 @@ def act_board(parameters, board, pressure, command):  # type: ignore[no-untyped-
     """Set the ``command`` (joints, 2) by what the policy said of the inputs, ``board.said``."""
     joints, rest = board.moves.shape[0], board.rest
     for j in range(joints):
-        active = rest.active.off[j, 1] < rest.active.off[j, 0]
-        board.underway[j, 0] = board.stays[j] and not rest.calm[j] and not active
+        board.underway[j, 0] = board.stays[j] and not rest.calm[j] and not is_second_better(rest.active, j)
     write_commands(parameters.commands, board.x, board.underway, board.said, board.slope, board.pulses)
     for j in range(joints):
         for muscle in range(2):
@@ -236,31 +235,20 @@ def board_parameters(agent: ServoAgent) -> BoardParameters:
 
 def board_state(parameters: BoardParameters, ways: tuple[float, ...] = ()) -> BoardState:
     """Return what changes, at first, with what was learned of the joints in the ``ways`` of the settings."""
-    layout = parameters.layout
-    joints, size = layout.joints, layout.command
-    column = (2 * joints, 1)
-    return BoardState(
-        fresh=np.ones(1, bool),
-        observation=np.zeros(layout.observed),
-        command=np.zeros(2 * joints),
-        x=np.zeros((size, 1), np.float32),
-        stays=np.zeros(joints, bool),
-        moves=np.zeros(joints, bool),
-        remains=np.zeros(joints, bool),
-        acts=np.zeros(joints, bool),
-        underway=np.zeros((joints, 1), bool),
-        error=np.zeros(joints),
-        features=np.zeros((joints, FEATURES)),
-        weights=np.zeros((joints, FEATURES)),
-        largest=np.zeros((joints, FEATURES)),
-        preview=np.zeros((parameters.inputs.steps.size, joints, 1), np.float32),
-        inputs=np.zeros((input_size(parameters.inputs), 1), np.float32),
-        said=np.zeros(column, np.float32),
-        slope=np.zeros(column, np.float32),
-        pulses=np.zeros(column, np.float32),
-        due=np.zeros((joints, 2)),
-        rest=resting(parameters.rest, joints, ways),
-    )
+    joints, previews = parameters.layout.joints, parameters.inputs.steps.size
+    shapes: dict[str, tuple[int, ...]] = {
+        "fresh": (1,),
+        "observation": (parameters.layout.observed,),
+        "command": (2 * joints,),
+        "x": (parameters.layout.command, 1),
+        "underway": (joints, 1),
+        "preview": (previews, joints, 1),
+        "inputs": (input_size(parameters.inputs), 1),
+        "due": (joints, 2),
+    }
+    shapes |= dict.fromkeys(("features", "weights", "largest"), (joints, FEATURES))
+    shapes |= dict.fromkeys(("said", "slope", "pulses"), (2 * joints, 1))
+    return BoardState(**blank(BoardState, joints, **shapes), rest=resting(parameters.rest, joints, ways))
 
 
 class BoardController:

@@ -9,6 +9,7 @@ from pneumarm.arm.seam import ArmSpec
 from pneumarm.learning.servo.at_rest import (
     Resting,
     RestParameters,
+    blank,
     choose_joints,
     leave_goals,
     limit_pulses,
@@ -18,7 +19,7 @@ from pneumarm.learning.servo.at_rest import (
 from pneumarm.learning.servo.commands import NEAR
 from pneumarm.learning.servo.foresight import Foresight
 from pneumarm.learning.servo.settings import ServoSettings
-from pneumarm.learning.servo.two_ways import ways_of, ways_parameters
+from pneumarm.learning.servo.two_ways import is_second_better, ways_of, ways_parameters
 from pneumarm.simulation.simulation import Simulation
 
 _LOOK = 0.134, 0.4  # s over which readings are averaged where the arm is nearly at rest: at least, at most
@@ -105,8 +106,7 @@ class Rest:
     @property
     def active(self) -> NDArray[np.bool_]:
         """Which joints are moved by their policy in every period, also near their goal, shape (joints,)."""
-        off = self.state.active.off
-        return np.asarray(off[:, 1] < off[:, 0])
+        return np.array([is_second_better(self.state.active, j) for j in range(len(self.state.calm))])
 
     def forget_readings(self) -> None:
         """Note that the arm was moved by others."""
@@ -243,38 +243,9 @@ def rest_parameters(spec: ArmSpec, simulation: Simulation, wanted: ServoSettings
 def resting(parameters: RestParameters, joints: int, known: tuple[float, ...] = ()) -> Resting:
     """Return what changes, at first, where so much is ``known`` as in :attr:`.ServoSettings.ways`."""
     numbers = np.reshape(known, (joints, _KNOWN)) if len(known) == _KNOWN * joints else np.empty((joints, 0))
-
-    def floats() -> NDArray[np.float64]:
-        return np.zeros(joints)
-
-    def whole() -> NDArray[np.int64]:
-        return np.zeros(joints, np.int64)
-
-    def flags() -> NDArray[np.bool_]:
-        return np.zeros(joints, np.bool_)
-
     longest = max(parameters.slowly, parameters.waited, parameters.foreseen)
     return Resting(
-        angles=np.zeros((longest, joints)),
-        seen=np.zeros(1, np.int64),
-        pulse=np.zeros((joints, 2)),
-        missed=floats(),
-        drift=floats(),
-        slow=flags(),
-        steady=flags(),
-        still=flags(),
-        asked=flags(),
-        calm=flags(),
-        quiet=flags(),
-        look=whole(),
-        left=whole(),
-        pulses=whole(),
-        error=floats(),
-        before=floats(),
-        bias=floats(),
-        swings=whole(),
-        side=floats(),
-        near=whole(),
+        **blank(Resting, joints, angles=(longest, joints), seen=(1,), pulse=(joints, 2)),
         damped=ways_of(list(numbers[:, :2]), parameters.damped.hoped),
         active=ways_of(list(numbers[:, 2:]), parameters.active.hoped),
     )

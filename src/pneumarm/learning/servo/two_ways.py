@@ -106,7 +106,7 @@ class TwoWays:
     @property
     def second(self) -> bool:
         """Whether the second way is the better one."""
-        return bool(self._ways.off[0, 1] < self._ways.off[0, 0])
+        return bool(is_second_better(self._ways, 0))
 
     @property
     def is_tried(self) -> bool:

@@ -1,6 +1,6 @@
-#ifdef __AVR__
-/* The two sums below, by hand: 22 and 12 cycles a product, where the compiler takes over a hundred. Rows are padded to
- * four products. The carry after a multiplication is the sign of its result. */
+/* The two sums of products of a network in whole numbers, by hand: 22 and 12 cycles a product, where the compiler takes
+ * over a hundred. The controller takes them in place of its own; a test compares what the board decides with these to
+ * what C decides without. Rows are padded to four products. The carry after a multiplication is its result's sign. */
 static int32_t sum_of_inputs(int place, int count)
 {
 	const int8_t *weights = network_weights + place;

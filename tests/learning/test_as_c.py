@@ -23,7 +23,7 @@ from pneumarm.learning.servo.controller import ServoController
 from pneumarm.learning.servo.quantised import BLOCK, ONE, Quantised, quantised_of, run_quantised, units_of
 from pneumarm.learning.servo.settings import ServoSettings
 from pneumarm.learning.servo.task import servo_sizes
-from pneumarm.learning.servo.translate import Array, Known, Translator
+from pneumarm.learning.servo.translate import Array, Constant, Translator
 from pneumarm.networks.layers import initial_weights, split
 
 COMPILERS = [name for name in ("gcc", "clang") if shutil.which(name)]
@@ -223,7 +223,7 @@ def _swapping(x):  # type: ignore[no-untyped-def]
 
 def test_known_numbers_are_written_as_such() -> None:
     whole = Translator()
-    whole.function(_weighted, Array("float64", (2,)), Known(np.array([0.1, 2.0]), "weights"))
+    whole.function(_weighted, Array("float64", (2,)), Constant(np.array([0.1, 2.0]), "weights"))
     assert "static const real weights[2] IN_FLASH = {" in whole.text()
     assert "REAL(0.1), REAL(2.0)" in whole.text()
 

@@ -10,6 +10,6 @@ Not varied, because the text or its source decides them: the order of updates an
 of Sutton and Barto; begin states are those that were recorded.
 """
 
-from pneumarm.experiments.calibration.choices import Calibration
+from pneumarm.experiments.calibration.choices import AgentCalibration
 
-EXPERIMENT = Calibration()
+EXPERIMENT = AgentCalibration()

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from pneumarm.experiments.all_goals import EXPERIMENT as ALL_GOALS
 from pneumarm.experiments.analysis import analysed, filled_words
-from pneumarm.experiments.calibration.choices import Calibration
+from pneumarm.experiments.calibration.choices import AgentCalibration
 from pneumarm.experiments.experiment import Analysis, TrialRows
 from pneumarm.experiments.factorial import rank_correlation
 from pneumarm.experiments.trainings import EXPLORING
@@ -14,7 +14,7 @@ from pneumarm.report.page import Table
 _GOAL = 51.0  # reward of a goal in place of an action that reaches none
 
 
-def analysis(experiment: Calibration, rows: TrialRows) -> Analysis:
+def analysis(experiment: AgentCalibration, rows: TrialRows) -> Analysis:
     """Return the choices from the nearest to the farthest, by the odd trials, and how they do in the even ones."""
     thesis, lines, figures = ALL_GOALS.thesis["reward"].mean(axis=1), [], {}
     for trial, choices in experiment.trials.items():

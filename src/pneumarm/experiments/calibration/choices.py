@@ -25,7 +25,7 @@ _INPUT = "input_scale"
 
 
 @dataclass(frozen=True)
-class Calibration(Experiment):
+class AgentCalibration(Experiment):
     """Combinations of the choices, each with all trials of all-goals."""
 
     name = "calibration"

@@ -12,7 +12,7 @@ from pneumarm.learning.servo.board import (
 )
 from pneumarm.learning.servo.networks import run_network
 from pneumarm.learning.servo.quantised import Quantised, run_quantised
-from pneumarm.learning.servo.translate import Array, Kept, Known, Translator
+from pneumarm.learning.servo.translate import Array, Constant, Kept, Translator
 
 _HELPERS = {
     "min_{name}": "{{\n\treturn a < b ? a : b;\n}}",
@@ -30,10 +30,10 @@ def as_c(agent: ServoAgent, quantised: Quantised | None = None) -> str:
     """Return all that acts of ``agent`` as C: ``servo_act`` and what it needs, ``quantised`` or in floats."""
     controller, whole, spec = BoardController(agent, quantised), Translator(), agent.spec
     joints, path = spec.joints, (controller.path_length, spec.joints)
-    servo, board = Known(controller.parameters, "servo"), Kept(controller.state, "board")
+    servo, board = Constant(controller.parameters, "servo"), Kept(controller.state, "board")
     angle, pressure, wanted = (Array("float64", shape) for shape in ((joints,), (joints, 2), path))
     run = run_network if quantised is None else run_quantised
-    network, units = Known(controller.network, "network"), Kept(controller.units, "units")
+    network, units = Constant(controller.network, "network"), Kept(controller.units, "units")
     whole.function(begin_board, servo, board)
     whole.function(ask_board, servo, board)
     whole.function(see_board, servo, board, angle, pressure, wanted, "bool")

@@ -39,7 +39,7 @@ from pneumarm.learning.servo.correction import (
 )
 from pneumarm.learning.servo.following import TAUGHT_BY
 from pneumarm.learning.servo.inputs import SeenParameters, input_size, write_inputs
-from pneumarm.learning.servo.networks import Network, network_of, run_network
+from pneumarm.learning.servo.networks import FloatNetwork, network_of, run_network
 from pneumarm.learning.servo.quantised import Quantised, Units, quantised_of, run_quantised, units_of
 from pneumarm.learning.servo.rest import rest_parameters, resting
 from pneumarm.learning.servo.spreading import spread_pulses
@@ -261,7 +261,7 @@ class BoardController:
         self.spec, self.goal_range = agent.spec, agent.goal_range
         self.parameters = board_parameters(agent)
         self.state = board_state(self.parameters, agent.settings.ways)
-        self.network: Network | Quantised = network_of(agent) if quantised is None else quantised
+        self.network: FloatNetwork | Quantised = network_of(agent) if quantised is None else quantised
         self.units: Singles | Units = (
             units_of(agent.sizes) if quantised else np.zeros((2, max(agent.sizes)), np.float32)
         )

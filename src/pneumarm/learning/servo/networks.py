@@ -10,7 +10,7 @@ from pneumarm.learning.network_agent import NetworkAgent
 from pneumarm.networks.tansig import FASTMATH, tansig
 
 
-class Network(NamedTuple):
+class FloatNetwork(NamedTuple):
     """A network. Made by :func:`network_of`."""
 
     weights: NDArray[np.float32]
@@ -19,9 +19,9 @@ class Network(NamedTuple):
     """Units of each layer, inputs first."""
 
 
-def network_of(agent: NetworkAgent) -> Network:
+def network_of(agent: NetworkAgent) -> FloatNetwork:
     """Return the network of ``agent``."""
-    return Network(np.ascontiguousarray(agent.policy, np.float32), np.array(agent.sizes, np.int16))
+    return FloatNetwork(np.ascontiguousarray(agent.policy, np.float32), np.array(agent.sizes, np.int16))
 
 
 @kernel(fastmath=FASTMATH)

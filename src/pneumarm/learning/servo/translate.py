@@ -4,7 +4,7 @@ What can be translated is the part of Python that reads the same in both languag
 of a fixed shape, assignments, ``if``, ``for`` over ``range``, arithmetic, comparisons, and calls of one another.
 Anything else is refused by name and line. Arguments are known when a function is translated, or not:
 
-- :class:`Known` ones, named tuples of numbers and arrays, become literals and tables, which a board keeps in flash.
+- :class:`Constant` ones, named tuples of numbers and arrays, become literals and tables, which a board keeps in flash.
 - :class:`Kept` ones, named tuples of arrays or single arrays, become static arrays: the state.
 - An :class:`Array` or a kind of number is what the C function takes as an argument.
 
@@ -54,7 +54,7 @@ _A_LINE = 12
 
 
 @dataclass(frozen=True)
-class Known:
+class Constant:
     """An argument that does not change: a number, an array, or a named tuple of such."""
 
     value: Any
@@ -93,7 +93,7 @@ class _Number:
     """What it is, where that is known."""
 
 
-_Value = Known | Kept | Array | _Number
+_Value = Constant | Kept | Array | _Number
 
 
 class Translator:
@@ -106,7 +106,7 @@ class Translator:
         self._made: dict[Any, tuple[str, str | None]] = {}
         self._names: set[str] = set()
 
-    def function(self, function: Any, *arguments: Known | Kept | Array | str) -> str:
+    def function(self, function: Any, *arguments: Constant | Kept | Array | str) -> str:
         """Translate ``function`` and return its name; a kind of number ("float64") stands for an argument."""
         given = [_Number("", one) if isinstance(one, str) else one for one in arguments]
         return self.made_of(function, given)[0]
@@ -146,7 +146,7 @@ class Translator:
 
 
 def _key(one: _Value) -> Any:
-    if isinstance(one, Known | Kept):
+    if isinstance(one, Constant | Kept):
         return type(one), one.name
     if isinstance(one, Array):
         return one.kind, one.shape, one.constant, "" if one.passed else one.place
@@ -355,11 +355,11 @@ class _Function:
         self._refuse(node, "a name that is no number")
 
     def _field(self, node: ast.AST, owner: _Value, attr: str) -> _Value:
-        if not isinstance(owner, Known | Kept) or not hasattr(owner.value, attr):
+        if not isinstance(owner, Constant | Kept) or not hasattr(owner.value, attr):
             self._refuse(node, "a field of a named tuple is wanted")
         value, name = getattr(owner.value, attr), f"{owner.name}_{attr}"
         if isinstance(value, np.ndarray):
-            return self._whole.array(value, name, isinstance(owner, Known))
+            return self._whole.array(value, name, isinstance(owner, Constant))
         if isinstance(value, tuple):
             return type(owner)(value, name)
         return self._known(value)
@@ -375,8 +375,8 @@ class _Function:
         return self._element(node, reading=True)
 
     def _as_array(self, value: _Value) -> _Value:
-        if isinstance(value, Known | Kept) and isinstance(value.value, np.ndarray):
-            return self._whole.array(value.value, value.name, isinstance(value, Known))
+        if isinstance(value, Constant | Kept) and isinstance(value.value, np.ndarray):
+            return self._whole.array(value.value, value.name, isinstance(value, Constant))
         return value
 
     def _element(self, node: ast.Subscript, reading: bool = False) -> Any:

@@ -4,7 +4,8 @@ What can be translated is the part of Python that reads the same in both languag
 of a fixed shape, assignments, ``if``, ``for`` over ``range``, arithmetic, comparisons, and calls of one another.
 Anything else is refused by name and line. Arguments are known when a function is translated, or not:
 
-- :class:`Constant` ones, named tuples of numbers and arrays, become literals and tables, which a board keeps in flash.
+- :class:`Constant` ones, named tuples of numbers and arrays, become literals and tables, which a board keeps in
+  flash.
 - :class:`Kept` ones, named tuples of arrays or single arrays, become static arrays: the state.
 - An :class:`Array` or a kind of number is what the C function takes as an argument.
 

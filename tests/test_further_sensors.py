@@ -123,7 +123,7 @@ def test_gymnasium_sees_states_with_them(done: Path) -> None:
     outside = gymnasium.make("pneumarm/PointToPoint-v0", arm=ARM, like=simulation)
     for env in (inside, outside):
         observation, _ = env.reset(seed=1)
-        assert observation.shape == (8 * 6 + 7 * 2 + 1,)
+        assert observation.shape == (8 * 6 + 7 * 2 + 2 + 1,)
         for _ in range(3):
             observation, *_ = env.step(int(env.action_space.sample()))
             assert env.observation_space.contains(observation)

@@ -131,7 +131,7 @@ def test_finished_movements_are_kept_when_the_link_is_lost_in_a_transfer(agent: 
         if done == 5:
             arm._line.left = 97  # type: ignore[attr-defined]  # in the next movement
 
-    with pytest.raises(ArmFailure, match="line to the board is gone"):
+    with pytest.raises(ArmFailure, match="not found again within 10 min"):
         transfer_into(folder, agent, arm, SHORT, seed=1, progress=pull_out)
     assert stored == [1, 2, 3, 4, 5]  # each as soon as it is made: a process that is killed then loses none
     with Store.open(folder / "transitions.db") as store:
@@ -139,7 +139,7 @@ def test_finished_movements_are_kept_when_the_link_is_lost_in_a_transfer(agent: 
         assert kinds == ["episode"] * 5 + ["broken episode"]
         broken = store.marks(6)[6]
     assert "broke off here" in broken[0].reason
-    with pytest.raises(ArmFailure, match="line to the board is gone"):
+    with pytest.raises(ArmFailure, match="not found again within 10 min"):
         transfer_into(folder, agent, emulated(300), SHORT, seed=1)
     result = transfer_into(folder, agent, emulated(), SHORT, seed=1)
     assert [result[phase]["episodes"] for phase in ("before", "after")] == [6, 6]

@@ -34,7 +34,9 @@ def test_the_usual_arm_needs_no_more_than_usual(tmp_path: Path) -> None:
 
 def test_an_arm_with_noisy_sensors_needs_more_and_is_predicted_better_with_them(of_noisy: Path) -> None:
     with Store.open(of_noisy) as store:
-        by_itself, usual = (fit_store(store, FitSettings(history=history, memory=1)) for history in (None, USUAL))
+        by_itself, usual = (
+            fit_store(store, FitSettings(history=history, memory=1, hysteresis=())) for history in (None, USUAL)
+        )
         chosen = by_itself.simulation.window.history
         assert chosen == chosen_history(store, store.spec) > USUAL
         assert by_itself.result.held_out.std[0] < usual.result.held_out.std[0]

@@ -14,6 +14,7 @@ from pneumarm.simulation.spread import spread_over_periods
 from pneumarm.task import begin_states
 from pneumarm.task.reference import counts_of
 from pneumarm.transitions import CollectSettings, Store, collect
+from pneumarm.transitions.hysteresis import RADII
 
 
 @pytest.fixture(scope="module")
@@ -30,7 +31,7 @@ def made(store):
 
 
 def test_a_record_without_pulses_is_learned_from_as_it_is(made):
-    commands = made.filtered.transitions.inputs[:, -4:]
+    commands = made.filtered.transitions.inputs[:, made.simulation.window.commanded]
     assert np.isin(commands, (-1, 0, 1)).all()
     assert made.simulation.commands == "valves"
 
@@ -49,7 +50,7 @@ def test_on_average_pulses_do_what_whole_periods_do_as_often(made, store):
         made.filtered.stream("held-out"),
         spec=store.spec,
         goal_range=made.simulation.goal_range,
-        settings=FitSettings(history=2, spread=False),
+        settings=FitSettings(history=2, hysteresis=RADII, spread=False),
     ).simulation
     others = np.setdiff1d(np.arange(asked.inputs.shape[1]), made.simulation.window.commanded)
     np.testing.assert_array_equal(asked.inputs[:, others], known.inputs[:, others])
@@ -68,7 +69,7 @@ def test_an_arm_with_pulses_that_was_recorded_without_any_is_taught_them_too(mad
         apart,
         spec=replace(store.spec, pulses=True),
         goal_range=made.simulation.goal_range,
-        settings=FitSettings(history=2, epochs=4),
+        settings=FitSettings(history=2, hysteresis=RADII, epochs=4),
     ).simulation
     assert taught.spread
     assert taught.commands == "valves"

@@ -157,8 +157,7 @@ def measure(
     guard = guarded(arm)
     joints, total = guard.spec.joints, arm_seconds(guard.spec, settings)
     told = progress or (lambda done, total: None)
-    begun = guard.despite_losses(guard.read).time
-    bench = _Bench(guard, settings, lambda time: told(min(time - begun, total), total))
+    bench = _Bench(guard, settings, lambda done: told(min(done, total), total))
     try:
         done = guard.despite_losses
         first = done(bench.vent)
@@ -250,13 +249,17 @@ class _Bench:
     def __init__(
         self, guard: GuardedArm, settings: CheckupSettings, told: Callable[[float], None] = lambda time: None
     ) -> None:
-        self.guard, self.settings, self._told, self._last = guard, settings, told, -np.inf
+        self.guard, self.settings, self._told = guard, settings, told
+        self._begun: float | None = None
+        self._last = -np.inf
 
     def tell(self, reading: Reading) -> None:
-        """Tell now and then what time it is on the arm's clock."""
+        """Tell now and then how long it has taken so far on the arm's clock."""
+        if self._begun is None:
+            self._begun = reading.time
         if reading.time - self._last >= _TELL:
             self._last = reading.time
-            self._told(reading.time)
+            self._told(reading.time - self._begun)
 
     def valves(self, joint: int, first: int, second: int) -> NDArray[np.int8]:
         """Return the valves of ``joint``; those of all others closed."""

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from pneumarm.arm.seam import Arm, ArmSpec, Reading, with_measured
 from pneumarm.arm.serial.clock import BoardClock
 from pneumarm.arm.serial.line import Line
-from pneumarm.arm.serial.link import Answer, Link
+from pneumarm.arm.serial.link import ADVICE, Answer, Link
 from pneumarm.arm.serial.protocol import (
     ANY_OVER_PRESSURE,
     EXTRAS,
@@ -259,7 +259,7 @@ class SerialArm(Arm):
             except LineLost as error:
                 if self._line.now() - begun >= AWAY:
                     raise self.link.lose(
-                        f"the board was not found again within {AWAY / 60:g} min ({error})", ArmFailure
+                        f"the board was not found again within {AWAY / 60:g} min ({error}); {ADVICE}", ArmFailure
                     ) from error
             self._line.sleep_until(self._line.now() + _LOOK)
         self.link.counts.losses += 1

@@ -19,7 +19,7 @@ FEWEST = 3
 _log = logging.getLogger("pneumarm")
 MOMENT = 1e-9
 """Times closer than this [s] are the same: a clock that is computed may end a step of its numbers early."""
-_ADVICE = f"it vents all muscles by itself after {DEAD_MAN:g} s. Look at plug and power"
+ADVICE = f"it vents all muscles by itself after {DEAD_MAN:g} s. Look at plug and power"
 
 
 @dataclass
@@ -114,7 +114,7 @@ class Link:
             return self._ask(request, values, wait)
         except OSError as error:
             self.broken = True
-            raise self.lose(f"the line to the board is gone ({error}); {_ADVICE}") from error
+            raise self.lose(f"the line to the board is gone ({error}); {ADVICE}") from error
         finally:
             self.counts.corrupt = self._splitter.corrupt
 
@@ -139,7 +139,7 @@ class Link:
                 self._pace.answered(answer.received - answer.sent)
                 return answer
             if wait is not None or (silence >= GIVE_UP and len(sent) >= FEWEST):
-                raise self.lose(f"the board has not answered for {silence:.2f} s; {_ADVICE}")
+                raise self.lose(f"the board has not answered for {silence:.2f} s; {ADVICE}")
             self.counts.retries += 1
 
     def _listen(self, kinds: tuple[Reply, Reply], sent: dict[int, float], until: float) -> Answer | None:

@@ -34,7 +34,7 @@ def simulation(tmp_path_factory):
     arm = VirtualArm(draw_parameters(3), seed=3)
     with Store.for_arm(tmp_path_factory.mktemp("monitor") / "db", arm.spec) as store:
         collect(arm, store, 10_000, 3, settings=WHOLE_PERIODS)
-        return fit_store(store, FitSettings()).simulation
+        return fit_store(store, FitSettings(epochs=12)).simulation
 
 
 @cache

@@ -30,7 +30,15 @@ from pneumarm.networks import (
     two_layers,
 )
 from pneumarm.networks import importance as importance_of
-from pneumarm.settings import NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveInt, Settings, Valid
+from pneumarm.settings import (
+    NonNegativeFloat,
+    NonNegativeInt,
+    PositiveFloat,
+    PositiveInt,
+    PythonOnly,
+    Settings,
+    Valid,
+)
 from pneumarm.simulation.ahead import fitted_ahead, stretches
 from pneumarm.simulation.history import LONGEST, SEEN, USUAL, chosen_history, columns
 from pneumarm.simulation.quality import Statistics, statistics
@@ -103,7 +111,7 @@ class FitSettings(Settings):
     and half of them before a fit ahead."""
     tolerance: Annotated[float, Meta(ge=0, lt=1)] = 1e-5
     """A fit ends early when three epochs in a row lower its error by less than this part; 0: never."""
-    decay: NonNegativeFloat = 0.0
+    decay: Annotated[NonNegativeFloat, PythonOnly] = 0.0
     """Weight decay (thesis: 0)."""
     ahead: Annotated[float, Meta(ge=0, le=10)] = 0.4
     """How far ahead predictions are fitted [s], after those of single steps; 0: not at all (thesis), which suits
@@ -413,7 +421,8 @@ def _fitted(
         fits = [_fit_two_layers(x, *pair, settings, joints, progress) for pair in zip(targets, starts, strict=True)]
     else:
         chosen = _rows_to_fit(len(x), _weights(x.shape[1], settings, joints), settings.seed)
-        fits = _fit_networks(x[chosen], [one[chosen] for one in targets], settings, joints, progress, before)
+        seen = [_seen_by(simulation, outputs, read) for outputs in np.split(simulation.outputs, len(targets))]
+        fits = _fit_networks(x[chosen], [one[chosen] for one in targets], seen, settings, joints, progress, before)
     still = np.ptp(x, axis=0) == 0
     networks = [
         _without(one.network, still).times(scale).widened(read, size)
@@ -455,15 +464,30 @@ def _commands(training: Transitions, window: Window) -> Commands:
     return "valves" if ((command == 0) | (np.abs(command) == 1)).all() else "pulses"
 
 
+def _seen_by(simulation: Simulation, outputs: NDArray[np.int64], read: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return which of the inputs ``read`` the network of these ``outputs`` sees: all, or all but stop operators.
+
+    How a joint came to where it is decides on its torque, and on no pressure.
+    """
+    window = simulation.window
+    pressures = (outputs < window.joint_size) & (outputs % len(QUANTITIES) >= QUANTITIES.index("pressure_1"))
+    memory = range(window.state_size - window.memory_size, window.state_size)
+    return np.flatnonzero(~np.isin(read, memory) if pressures.all() else np.ones(len(read), np.bool_))
+
+
 def _fit_networks(
     x: NDArray[np.float32],
     targets: list[NDArray[np.float64]],
+    seen: list[NDArray[np.int64]],
     settings: FitSettings,
     joints: int,
     progress: Callable[[int, int], None],
     before: Sequence[Network],
 ) -> list[Fit]:
-    """Fit a network to each of ``targets``, on as many threads as there are cores: the work is in NumPy."""
+    """Fit a network to each of ``targets``, on as many threads as there are cores: the work is in NumPy.
+
+    ``seen`` are the columns of ``x`` that each reads.
+    """
     solver = LevenbergMarquardt(epochs=settings.epochs, tolerance=settings.tolerance, decay=settings.decay)
     seeds = np.random.SeedSequence(settings.seed).generate_state(len(targets))
     done = [0] * len(targets)
@@ -473,15 +497,16 @@ def _fit_networks(
             done[number] = epoch
             progress(sum(done), settings.epochs * len(targets))
 
-        y = targets[number]
+        y, inputs = targets[number], seen[number]
         if before:
-            start = before[number]
+            start = before[number].reading(inputs)
         else:
-            start = nguyen_widrow(x.shape[1], _hidden(settings, joints), y.shape[1], int(seeds[number]))
+            start = nguyen_widrow(len(inputs), _hidden(settings, joints), y.shape[1], int(seeds[number]))
         if not y.any():  # what never changed needs no fit
             start = replace(start, output_weights=np.zeros_like(start.output_weights))
-            return Fit(start, np.zeros(1), 0, converged=True)
-        return levenberg_marquardt(x, y, start, solver, report)
+            return Fit(start.widened(inputs, x.shape[1]), np.zeros(1), 0, converged=True)
+        fitted = levenberg_marquardt(x[:, inputs], y, start, solver, report)
+        return fitted._replace(network=fitted.network.widened(inputs, x.shape[1]))
 
     with ThreadPoolExecutor(min(len(targets), os.cpu_count() or 1)) as threads:
         return list(threads.map(one, range(len(targets))))

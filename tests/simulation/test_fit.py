@@ -297,7 +297,7 @@ def test_the_length_of_pulses_is_learned(tmp_path: Path) -> None:
     arm = VirtualArm(draw_parameters(3), seed=1)
     with Store.create(tmp_path / "store.db", arm.spec) as store:
         collect(arm, store, 4000, settings=CollectSettings(pulses=0.5))
-        simulation = fit_store(store, FitSettings(epochs=10, hidden=6))[0].simulation
+        simulation = fit_store(store, FitSettings(epochs=30, hidden=6))[0].simulation
         states = filter_transitions(store, simulation.window).transitions.inputs[::20].copy()
     assert simulation.commands == "pulses"
     assert simulation.valves
